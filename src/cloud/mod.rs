@@ -1,0 +1,1 @@
+//! STEP 2: a sub-tree becomes billboards, each with cost and error.

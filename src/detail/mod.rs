@@ -1,0 +1,1 @@
+//! STEP 3: billboards become levels of detail.

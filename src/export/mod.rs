@@ -1,0 +1,1 @@
+//! STEP 4: levels become a package on disk.

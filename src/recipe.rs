@@ -1,0 +1,1 @@
+//! Recipe: every knob of a bake with unit, range and default; presets draft, balanced, best.

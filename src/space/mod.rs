@@ -1,0 +1,3 @@
+//! Geometry and rasters that know no botany.
+
+pub mod glb;
