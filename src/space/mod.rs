@@ -1,3 +1,5 @@
 //! Geometry and rasters that know no botany.
 
+pub mod eigen;
 pub mod glb;
+pub mod hull;
