@@ -3,3 +3,4 @@
 pub mod eigen;
 pub mod glb;
 pub mod hull;
+pub mod raster;

@@ -1,0 +1,144 @@
+//! Which samples a scene hits: alpha without colour or depth, the fast path.
+
+use super::camera::Corner;
+use super::draw::Fragment;
+use super::triangle::Triangle;
+use super::{Camera, Sampling, Scene};
+
+/// For every sample, whether anything hits it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Mask {
+    /// Width in pixels.
+    pub width: u32,
+    /// Height in pixels.
+    pub height: u32,
+    /// Samples along a pixel's edge.
+    pub side: u32,
+    /// One byte a sample, 0 or 1, rows of `width * side` from the top.
+    pub samples: Vec<u8>,
+}
+
+/// For every pixel, the share of its samples that are hit.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Coverage {
+    /// Width in pixels.
+    pub width: u32,
+    /// Height in pixels.
+    pub height: u32,
+    /// 0 to 1, rows from the top.
+    pub fraction: Vec<f32>,
+}
+
+/// What a drawing cost.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Stats {
+    /// Samples inside triangles that face the eye, before alpha test: what a GPU shades.
+    pub fragments: u64,
+    /// Samples that are hit at least once.
+    pub covered: u64,
+}
+
+/// Draws where the scene is.
+pub fn coverage(scene: &Scene, camera: &Camera, sampling: Sampling) -> Mask {
+    coverage_with_stats(scene, camera, sampling).0
+}
+
+/// As [`coverage`], with the number of fragments.
+pub fn coverage_with_stats(scene: &Scene, camera: &Camera, sampling: Sampling) -> (Mask, Stats) {
+    let corners = camera.project(scene.geometry.positions, sampling.side);
+    let (width, height) = (
+        (camera.width * sampling.side) as i32,
+        (camera.height * sampling.side) as i32,
+    );
+    let mut samples = vec![0u8; width as usize * height as usize];
+    let mut fragments = 0;
+    for (id, indices) in scene.geometry.triangles.iter().enumerate() {
+        let material = scene.material(id);
+        let at: [Corner; 3] = indices.map(|i| corners[i as usize]);
+        let Some(triangle) = Triangle::new(at, material.double_sided) else {
+            continue;
+        };
+        // Most leaves of a far tree hit no sample: their texture planes are made on first use.
+        let mut fragment = None;
+        triangle.scan(width, height, |y, from, to| {
+            fragments += (to - from) as u64;
+            let row = y as usize * width as usize;
+            let row = &mut samples[row + from as usize..row + to as usize];
+            if material.cutoff.is_none() {
+                return row.fill(1);
+            }
+            let fragment = fragment.get_or_insert_with(|| {
+                Fragment::new(scene, material, indices, &at, &triangle, sampling)
+            });
+            for (sample, x) in row.iter_mut().zip(from..) {
+                if *sample == 0 && fragment.passes(x, y) {
+                    *sample = 1;
+                }
+            }
+        });
+    }
+    let mask = Mask {
+        width: camera.width,
+        height: camera.height,
+        side: sampling.side,
+        samples,
+    };
+    let covered = mask.samples.iter().map(|&s| s as u64).sum();
+    (mask, Stats { fragments, covered })
+}
+
+impl Mask {
+    /// Averages the samples of every pixel.
+    pub fn coverage(&self) -> Coverage {
+        self.coverage_shifted(0, 0)
+    }
+
+    /// As if the content had been drawn so many samples farther right and down.
+    ///
+    /// Exactly what a shifted camera would draw, since corners snap to parts of a sample; only
+    /// what would come in from outside is missing.
+    pub fn coverage_shifted(&self, right: i32, down: i32) -> Coverage {
+        let (side, row) = (self.side as i32, (self.width * self.side) as i32);
+        let rows = (self.height * self.side) as i32;
+        let mut fraction = Vec::with_capacity((self.width * self.height) as usize);
+        let scale = 1.0 / (side * side) as f32;
+        for y in 0..self.height as i32 {
+            for x in 0..self.width as i32 {
+                let mut sum = 0u32;
+                for sy in (y * side - down).max(0)..((y + 1) * side - down).min(rows) {
+                    let from = (x * side - right).max(0);
+                    let to = ((x + 1) * side - right).min(row);
+                    if from < to {
+                        let at = (sy * row) as usize;
+                        let samples = &self.samples[at + from as usize..at + to as usize];
+                        sum += samples.iter().map(|&s| s as u32).sum::<u32>();
+                    }
+                }
+                fraction.push(sum as f32 * scale);
+            }
+        }
+        Coverage {
+            width: self.width,
+            height: self.height,
+            fraction,
+        }
+    }
+
+    /// Covered area in pixels.
+    pub fn area(&self) -> f64 {
+        let covered: u64 = self.samples.iter().map(|&s| s as u64).sum();
+        covered as f64 / (self.side * self.side) as f64
+    }
+}
+
+impl Coverage {
+    /// Covered area in pixels.
+    pub fn area(&self) -> f64 {
+        self.fraction.iter().map(|&c| c as f64).sum()
+    }
+
+    /// Whether a pixel is at least half covered.
+    pub fn silhouette(&self) -> Vec<bool> {
+        self.fraction.iter().map(|&c| c >= 0.5).collect()
+    }
+}

@@ -1,0 +1,178 @@
+//! From an item buffer to pixels: base colour, light, normals and depth.
+
+use glam::Vec3;
+
+use super::draw::{EMPTY, Fragment, Items};
+use super::image::Picture;
+use super::triangle::{Plane, Triangle};
+use super::{Camera, Sampling, Scene};
+
+/// How surfaces are lit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Light {
+    /// Base colour alone.
+    Unlit,
+    /// A sky from above, a darker ground from below, and a sun from the upper right front.
+    Outdoors,
+}
+
+impl Light {
+    /// Light that reaches a surface with this normal, as a factor on its base colour.
+    fn on(self, normal: Vec3) -> f32 {
+        match self {
+            Self::Unlit => 1.0,
+            Self::Outdoors => {
+                let sky = 0.5 + 0.5 * normal.y;
+                let sun = normal.dot(Vec3::new(0.45, 0.78, 0.43)).max(0.0);
+                0.22 + 0.28 * sky + 0.6 * sun
+            }
+        }
+    }
+}
+
+/// Linear light (0 to 1) of an sRGB value (0 to 1), IEC 61966-2-1.
+pub fn linear_from_srgb(value: f32) -> f32 {
+    if value <= 0.040_45 {
+        value / 12.92
+    } else {
+        ((value + 0.055) / 1.055).powf(2.4)
+    }
+}
+
+/// sRGB value (0 to 1) of linear light (0 to 1).
+pub fn srgb_from_linear(value: f32) -> f32 {
+    if value <= 0.003_130_8 {
+        value * 12.92
+    } else {
+        1.055 * value.powf(1.0 / 2.4) - 0.055
+    }
+}
+
+/// A triangle whose values are read at several samples.
+struct Surface<'a> {
+    fragment: Fragment<'a>,
+    normal: Option<[Plane; 3]>,
+    color: Option<[Plane; 3]>,
+    q: Plane,
+    /// Minus one where the back is seen: its normal points the other way.
+    side: f32,
+}
+
+impl Items {
+    /// Share of each pixel's samples that are hit.
+    pub fn mask(&self) -> super::Mask {
+        super::Mask {
+            width: self.width,
+            height: self.height,
+            side: self.side,
+            samples: self.triangle.iter().map(|&t| (t != EMPTY) as u8).collect(),
+        }
+    }
+
+    /// Shades every sample and averages the hit ones of each pixel.
+    ///
+    /// `scene`, `camera` and `sampling` must be those that the items were drawn with.
+    pub fn shade(
+        &self,
+        scene: &Scene,
+        camera: &Camera,
+        sampling: Sampling,
+        light: Light,
+    ) -> Picture {
+        let corners = camera.project(scene.geometry.positions, sampling.side);
+        let pixels = (self.width * self.height) as usize;
+        let mut picture = Picture {
+            width: self.width,
+            height: self.height,
+            coverage: vec![0.0; pixels],
+            color: vec![[0.0; 3]; pixels],
+            normal: vec![Vec3::ZERO; pixels],
+            near: vec![f32::NEG_INFINITY; pixels],
+        };
+        let mut cached: Option<(u32, Surface)> = None;
+        let row = (self.width * self.side) as usize;
+        for (sample, &id) in self.triangle.iter().enumerate() {
+            if id == EMPTY {
+                continue;
+            }
+            let (x, y) = (sample % row, sample / row);
+            let pixel = y / self.side as usize * self.width as usize + x / self.side as usize;
+            if cached.as_ref().is_none_or(|(cached, _)| *cached != id) {
+                cached = Surface::new(scene, &corners, id, sampling).map(|s| (id, s));
+            }
+            let Some((_, surface)) = &cached else {
+                continue;
+            };
+            let (albedo, normal) = surface.at(x as i32, y as i32);
+            let lit = light.on(normal);
+            for (sum, value) in picture.color[pixel].iter_mut().zip(albedo) {
+                *sum += value * lit;
+            }
+            picture.normal[pixel] += normal;
+            picture.near[pixel] = picture.near[pixel].max(self.near[sample]);
+            picture.coverage[pixel] += 1.0;
+        }
+        let per_pixel = (self.side * self.side) as f32;
+        for pixel in 0..pixels {
+            let hits = picture.coverage[pixel];
+            if hits > 0.0 {
+                picture.color[pixel] = picture.color[pixel].map(|c| c / hits);
+                picture.normal[pixel] = picture.normal[pixel].normalize_or_zero();
+                picture.coverage[pixel] = hits / per_pixel;
+            }
+        }
+        picture
+    }
+}
+
+impl<'a> Surface<'a> {
+    fn new(
+        scene: &Scene<'a>,
+        corners: &[super::camera::Corner],
+        id: u32,
+        sampling: Sampling,
+    ) -> Option<Self> {
+        let material = match scene.geometry.triangle_material.get(id as usize) {
+            Some(&material) => &scene.materials[material as usize],
+            None => &scene.materials[0],
+        };
+        let indices = &scene.geometry.triangles[id as usize];
+        let at = indices.map(|i| corners[i as usize]);
+        let triangle = Triangle::new(at, material.double_sided)?;
+        let q = at.map(|c| c.q);
+        let over = |values: [Vec3; 3]| {
+            let axis =
+                |axis: usize| triangle.plane(std::array::from_fn(|i| values[i][axis] * q[i]));
+            [axis(0), axis(1), axis(2)]
+        };
+        let (normals, colors) = (scene.geometry.normals, scene.geometry.colors);
+        Some(Self {
+            fragment: Fragment::new(scene, material, indices, &at, &triangle, sampling),
+            normal: (!normals.is_empty()).then(|| over(indices.map(|i| normals[i as usize]))),
+            color: (!colors.is_empty()).then(|| {
+                over(indices.map(|i| {
+                    let [r, g, b, _] = colors[i as usize];
+                    Vec3::new(r, g, b)
+                }))
+            }),
+            q: triangle.plane(q),
+            side: if triangle.front { 1.0 } else { -1.0 },
+        })
+    }
+
+    fn at(&self, x: i32, y: i32) -> ([f32; 3], Vec3) {
+        let q = self.q.value(x, y);
+        let value = |planes: &[Plane; 3]| {
+            Vec3::from_array(std::array::from_fn(|i| planes[i].value(x, y))) / q
+        };
+        let normal = self.normal.as_ref().map_or(Vec3::Y, |planes| {
+            value(planes).normalize_or(Vec3::Y) * self.side
+        });
+        let mut albedo = self.fragment.albedo(x, y);
+        if let Some(planes) = &self.color {
+            let tint = value(planes);
+            albedo = [albedo[0] * tint.x, albedo[1] * tint.y, albedo[2] * tint.z];
+        }
+        (albedo, normal)
+    }
+}

@@ -1,0 +1,189 @@
+//! One triangle on the sample grid: which samples are inside, and how values vary over it.
+//!
+//! Edge functions after Pineda ("A parallel algorithm for polygon rasterization", SIGGRAPH 1988)
+//! in integers, with the top-left rule: of two triangles that share an edge exactly one owns each
+//! sample on it, so a closed mesh has neither holes nor double hits.
+
+use super::camera::{Corner, SUBSAMPLES};
+
+/// A triangle ready to be scanned; corners run clockwise on the screen (y down).
+pub(super) struct Triangle {
+    corners: [Corner; 3],
+    /// Which corner of the model's triangle each corner is.
+    order: [usize; 3],
+    /// Twice the area in sub-samples, positive.
+    area2: i64,
+    /// Whether its front is seen.
+    pub front: bool,
+}
+
+/// The value of a quantity at any sample: `at + dx * x + dy * y`.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Plane {
+    at: f32,
+    /// Change from a sample to its right neighbour.
+    pub dx: f32,
+    /// Change from a sample to the one below.
+    pub dy: f32,
+    x0: f32,
+    y0: f32,
+}
+
+impl Plane {
+    pub fn value(&self, x: i32, y: i32) -> f32 {
+        self.at + self.dx * (x as f32 - self.x0) + self.dy * (y as f32 - self.y0)
+    }
+}
+
+impl Triangle {
+    /// `None`: empty after snapping, a back face that is culled, or outside.
+    pub fn new(corners: [Corner; 3], double_sided: bool) -> Option<Self> {
+        let [a, b, c] = corners;
+        if a.is_outside() || b.is_outside() || c.is_outside() {
+            return None;
+        }
+        let area2 = cross(&a, &b, &c);
+        // Counter-clockwise in a space with y up is negative here, where y is down.
+        let front = area2 < 0;
+        if area2 == 0 || !(front || double_sided) {
+            return None;
+        }
+        let (corners, order) = if front {
+            ([a, c, b], [0, 2, 1])
+        } else {
+            (corners, [0, 1, 2])
+        };
+        Some(Self {
+            corners,
+            order,
+            area2: area2.abs(),
+            front,
+        })
+    }
+
+    /// How a quantity with these values at the model's corners varies over the screen.
+    pub fn plane(&self, values: [f32; 3]) -> Plane {
+        let [a, b, c] = &self.corners;
+        let [fa, fb, fc] = self.order.map(|i| values[i]);
+        let (bx, by) = ((b.x - a.x) as f32, (b.y - a.y) as f32);
+        let (cx, cy) = ((c.x - a.x) as f32, (c.y - a.y) as f32);
+        let per_area = SUBSAMPLES as f32 / self.area2 as f32;
+        let grain = 1.0 / SUBSAMPLES as f32;
+        Plane {
+            at: fa,
+            dx: ((fb - fa) * cy - (fc - fa) * by) * per_area,
+            dy: ((fc - fa) * bx - (fb - fa) * cx) * per_area,
+            x0: a.x as f32 * grain - 0.5,
+            y0: a.y as f32 * grain - 0.5,
+        }
+    }
+
+    /// The plane of [`Corner::near`].
+    pub fn near_plane(&self, corners: [Corner; 3]) -> Plane {
+        self.plane(corners.map(|c| c.near))
+    }
+
+    /// Calls `span(y, from, to)` for every row with samples `from..to` inside.
+    pub fn scan(&self, width: i32, height: i32, mut span: impl FnMut(i32, i32, i32)) {
+        let [a, b, c] = &self.corners;
+        let (low_x, high_x) = (a.x.min(b.x).min(c.x), a.x.max(b.x).max(c.x));
+        let (low_y, high_y) = (a.y.min(b.y).min(c.y), a.y.max(b.y).max(c.y));
+        // Sample i lies at (i + 1/2) samples.
+        let half = SUBSAMPLES / 2;
+        let first = |low: i32| (low + half - 1).div_euclid(SUBSAMPLES).max(0);
+        let last = |high: i32, size: i32| (high - half).div_euclid(SUBSAMPLES).min(size - 1);
+        let (x0, x1) = (first(low_x), last(high_x, width));
+        let (y0, y1) = (first(low_y), last(high_y, height));
+        if x0 > x1 || y0 > y1 {
+            return;
+        }
+        let mut edges = [(a, b), (b, c), (c, a)].map(|(from, to)| Edge::new(from, to, x0, y0));
+        for y in y0..=y1 {
+            let (from, to) = if x1 - x0 < SHORT_ROW {
+                step_row(&edges, x1 - x0)
+            } else {
+                solve_row(&edges, x1 - x0)
+            };
+            if from < to {
+                span(y, x0 + from, x0 + to);
+            }
+            for edge in &mut edges {
+                edge.value += edge.down;
+            }
+        }
+    }
+}
+
+/// Rows shorter than this are stepped through; longer ones are worth three divisions.
+const SHORT_ROW: i32 = 12;
+
+fn cross(a: &Corner, b: &Corner, c: &Corner) -> i64 {
+    let (bx, by) = ((b.x - a.x) as i64, (b.y - a.y) as i64);
+    let (cx, cy) = ((c.x - a.x) as i64, (c.y - a.y) as i64);
+    bx * cy - by * cx
+}
+
+/// An edge function: not negative on the inner side.
+#[derive(Clone, Copy)]
+struct Edge {
+    value: i64,
+    right: i64,
+    down: i64,
+}
+
+impl Edge {
+    fn new(from: &Corner, to: &Corner, x: i32, y: i32) -> Self {
+        let (dx, dy) = ((to.x - from.x) as i64, (to.y - from.y) as i64);
+        let grain = SUBSAMPLES as i64;
+        let (px, py) = (
+            x as i64 * grain + grain / 2 - from.x as i64,
+            y as i64 * grain + grain / 2 - from.y as i64,
+        );
+        // A sample on the edge itself belongs to the triangle whose top or left edge it is.
+        let owns = dy < 0 || (dy == 0 && dx > 0);
+        Self {
+            value: dx * py - dy * px - if owns { 0 } else { 1 },
+            right: -dy * grain,
+            down: dx * grain,
+        }
+    }
+}
+
+/// The samples `from..to` of a row that are inside, by trying each one.
+fn step_row(edges: &[Edge; 3], last: i32) -> (i32, i32) {
+    let [mut a, mut b, mut c] = edges.map(|e| e.value);
+    let (mut from, mut to) = (0, 0);
+    for x in 0..=last {
+        if (a | b | c) >= 0 {
+            if to == 0 {
+                from = x;
+            }
+            to = x + 1;
+        } else if to > 0 {
+            break;
+        }
+        a += edges[0].right;
+        b += edges[1].right;
+        c += edges[2].right;
+    }
+    (from, to)
+}
+
+/// The samples `from..to` of a row that are inside, by solving for both ends.
+fn solve_row(edges: &[Edge; 3], last: i32) -> (i32, i32) {
+    let (mut from, mut to) = (0i64, last as i64);
+    for edge in edges {
+        if edge.right > 0 {
+            from = from.max((-edge.value + edge.right - 1).div_euclid(edge.right));
+        } else if edge.right < 0 {
+            to = to.min(edge.value.div_euclid(-edge.right));
+        } else if edge.value < 0 {
+            return (0, 0);
+        }
+    }
+    if from <= to {
+        (from as i32, to as i32 + 1)
+    } else {
+        (0, 0)
+    }
+}
