@@ -1,23 +1,14 @@
-//! Convex outlines in the plane: hull, smallest rectangle, smallest triangle, few corners.
-//!
-//! The smallest triangle follows O'Rourke, Aggarwal, Maddila and Baldwin ("An optimal algorithm
-//! for finding minimal enclosing triangles", J. Algorithms 7, 1986): one with two sides flush
-//! with hull edges exists, and the third touches the hull at its own midpoint or is flush too.
-//! (With one side flush, the midpoints of the others touch; where both touch in a corner, the
-//! triangle can be sheared along the flush side at equal area until one of them is flush.) With
-//! outlines this small, trying all pairs is simpler and sturdier than their linear sweep.
+//! Convex outlines in the plane: hull, smallest rectangle, few corners.
 
 use glam::{DVec2, Vec2};
 
+pub use super::min_triangle::min_triangle;
+
 /// Outlines are never thinner than this, in normalised units (2 mm on a tree of 20 m), nor than
 /// [`MIN_THICKNESS_RATIO`] of their length: a card of no area would be dropped by every importer.
-pub const MIN_THICKNESS: f64 = 2e-4;
+pub const MIN_THICKNESS: f32 = 2e-4;
 /// See [`MIN_THICKNESS`].
-pub const MIN_THICKNESS_RATIO: f64 = 1e-3;
-
-/// Hulls are brought to this many corners before the smallest triangle is searched for; the
-/// search takes the cube of it. On random hulls it costs less than a percent of area.
-const TRIANGLE_SEARCH_CORNERS: usize = 16;
+pub const MIN_THICKNESS_RATIO: f32 = 1e-3;
 
 /// A rectangle in the plane with the corners `center ± axis * half.x ± perp(axis) * half.y`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -104,95 +95,22 @@ pub fn min_rect(hull: &[Vec2]) -> Rect2 {
         None if hull.is_empty() => (DVec2::X, DVec2::ZERO, DVec2::ZERO),
         None => along(DVec2::X),
     };
-    let size = high - low;
-    let least = MIN_THICKNESS.max(size.max_element() * MIN_THICKNESS_RATIO);
     let middle = (low + high) / 2.0;
     Rect2 {
         center: (axis * middle.x + axis.perp() * middle.y).as_vec2(),
         axis: axis.as_vec2(),
-        half: (size.max(DVec2::splat(least)) / 2.0).as_vec2(),
+        half: thickened((high - low).as_vec2()) / 2.0,
     }
+}
+
+/// The sides of a rectangle, none of them under [`MIN_THICKNESS`].
+pub fn thickened(size: Vec2) -> Vec2 {
+    let least = MIN_THICKNESS.max(size.max_element() * MIN_THICKNESS_RATIO);
+    size.max(Vec2::splat(least))
 }
 
 fn rect_area((_, low, high): &(DVec2, DVec2, DVec2)) -> f64 {
     (high.x - low.x) * (high.y - low.y)
-}
-
-/// The smallest triangle around a hull, counter-clockwise (see the head of this file; hulls with
-/// more than 16 corners are simplified first, so the answer is then near the smallest). Degenerate
-/// hulls get a thin triangle. The area is at most twice the hull's.
-pub fn min_triangle(hull: &[Vec2]) -> [Vec2; 3] {
-    let hull = thick(hull);
-    let hull: Vec<DVec2> = shrink(&hull, TRIANGLE_SEARCH_CORNERS)
-        .iter()
-        .map(|p| p.as_dvec2())
-        .collect();
-    let n = hull.len();
-    let mut best: Option<(f64, [DVec2; 3])> = None;
-    for i in 0..n {
-        for j in 0..n {
-            if let Some(triangle) = (i != j).then(|| smallest_third(&hull, i, j)).flatten() {
-                let size = cross(triangle[1] - triangle[0], triangle[2] - triangle[0]);
-                if size > 0.0 && best.is_none_or(|(least, _)| size < least) {
-                    best = Some((size, triangle));
-                }
-            }
-        }
-    }
-    match best {
-        Some((_, triangle)) => triangle.map(|p| p.as_vec2()),
-        None => triangle_of_rect(&min_rect(
-            &hull.iter().map(|p| p.as_vec2()).collect::<Vec<_>>(),
-        )),
-    }
-}
-
-/// The smallest triangle with sides along hull edges `i` and `j`, where `j` follows `i` at the
-/// triangle's corner between them. The third side runs over the hull corners after `j`.
-fn smallest_third(hull: &[DVec2], i: usize, j: usize) -> Option<[DVec2; 3]> {
-    let n = hull.len();
-    let edge = |k: usize| (hull[k % n], (hull[(k + 1) % n] - hull[k % n]).normalize());
-    let ((pi, di), (pj, dj)) = (edge(i), edge(j));
-    if cross(di, dj) <= 1e-9 {
-        return None;
-    }
-    let apex = meet(pi, di, pj, dj)?;
-    // The far side meets line i before the hull and line j behind it, and keeps the hull to its left.
-    let close = |p: DVec2, d: DVec2| {
-        let (a, b) = (meet(p, d, pj, dj)?, meet(p, d, pi, di)?);
-        let holds = hull.iter().all(|&q| cross(d, q - p) >= -1e-9);
-        let ahead = (a - apex).dot(dj) > 0.0 && (b - apex).dot(di) < 0.0 && (b - a).dot(d) > 0.0;
-        (holds && ahead).then_some([apex, a, b])
-    };
-    let mut best: Option<(f64, [DVec2; 3])> = None;
-    let mut keep = |triangle: Option<[DVec2; 3]>| {
-        if let Some(t) = triangle {
-            let size = cross(t[1] - t[0], t[2] - t[0]);
-            if best.is_none_or(|(least, _)| size < least) {
-                best = Some((size, t));
-            }
-        }
-    };
-    for k in 0..n {
-        let (p, d) = edge(k);
-        keep(close(p, d));
-        // The side whose midpoint is p: from a on line j to b on line i with a + b = 2 p.
-        let across = 2.0 * (p - apex);
-        let (s, t) = (
-            cross(across, di) / cross(dj, di),
-            cross(across, dj) / cross(di, dj),
-        );
-        if let Some(direction) = (di * t - dj * s).try_normalize() {
-            keep(close(p, direction));
-        }
-    }
-    best.map(|(_, triangle)| triangle)
-}
-
-/// A triangle around a rectangle, of twice its area.
-fn triangle_of_rect(rect: &Rect2) -> [Vec2; 3] {
-    let [a, b, _, d] = rect.corners();
-    [a, b + (b - a), d + (d - a)]
 }
 
 /// A convex polygon of at most `most` corners (3 or more) around a hull, counter-clockwise.
@@ -217,10 +135,10 @@ pub fn simplify(hull: &[Vec2], most: usize) -> Vec<Vec2> {
 }
 
 /// The hull, or where it has no area the thin rectangle around it.
-fn thick(hull: &[Vec2]) -> Vec<Vec2> {
+pub(super) fn thick(hull: &[Vec2]) -> Vec<Vec2> {
     let rect = min_rect(hull);
-    let least = MIN_THICKNESS.max(f64::from(rect.half.max_element()) * 2.0 * MIN_THICKNESS_RATIO);
-    let thin = f64::from(rect.half.min_element()) * 2.0 <= least * (1.0 + 1e-6);
+    let least = thickened(Vec2::new(rect.half.max_element() * 2.0, 0.0)).y;
+    let thin = rect.half.min_element() * 2.0 <= least * (1.0 + 1e-5);
     if hull.len() < 3 || thin {
         rect.corners().to_vec()
     } else {
@@ -229,7 +147,7 @@ fn thick(hull: &[Vec2]) -> Vec<Vec2> {
 }
 
 /// Removes edges, least added area first, until `most` corners (4 or more) are left.
-fn shrink(hull: &[Vec2], most: usize) -> Vec<Vec2> {
+pub(super) fn shrink(hull: &[Vec2], most: usize) -> Vec<Vec2> {
     let mut corners: Vec<DVec2> = hull.iter().map(|p| p.as_dvec2()).collect();
     while corners.len() > most.max(4) {
         let n = corners.len();
@@ -252,7 +170,7 @@ fn shrink(hull: &[Vec2], most: usize) -> Vec<Vec2> {
 }
 
 /// Where two lines meet, or `None` for (nearly) parallel ones.
-fn meet(p: DVec2, d: DVec2, q: DVec2, e: DVec2) -> Option<DVec2> {
+pub(super) fn meet(p: DVec2, d: DVec2, q: DVec2, e: DVec2) -> Option<DVec2> {
     let across = cross(d, e);
     if across.abs() <= 1e-12 * d.length() * e.length() {
         return None;
@@ -261,7 +179,7 @@ fn meet(p: DVec2, d: DVec2, q: DVec2, e: DVec2) -> Option<DVec2> {
     point.is_finite().then_some(point)
 }
 
-fn cross(a: DVec2, b: DVec2) -> f64 {
+pub(super) fn cross(a: DVec2, b: DVec2) -> f64 {
     a.perp_dot(b)
 }
 
@@ -295,7 +213,7 @@ pub fn holds(polygon: &[Vec2], point: Vec2, slack: f32) -> bool {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
     fn v(x: f32, y: f32) -> Vec2 {
@@ -303,7 +221,7 @@ mod tests {
     }
 
     /// Pseudo-random points (a linear congruential generator), stretched and turned.
-    fn cloud(seed: u32, count: usize) -> Vec<Vec2> {
+    pub(in crate::space) fn cloud(seed: u32, count: usize) -> Vec<Vec2> {
         let mut state = seed.wrapping_mul(2_654_435_761).wrapping_add(12_345);
         let mut next = move || {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -338,20 +256,6 @@ mod tests {
     }
 
     #[test]
-    fn smallest_triangle_of_known_shapes() {
-        let triangle = [v(0., 0.), v(4., 0.), v(1., 3.)];
-        assert!((area(&min_triangle(&convex_hull(triangle))) - 6.0).abs() < 1e-5);
-        // Around a square it has twice the area; around a regular hexagon of side one, the
-        // triangle of side three.
-        let square = convex_hull([v(0., 0.), v(1., 0.), v(1., 1.), v(0., 1.)]);
-        assert!((area(&min_triangle(&square)) - 2.0).abs() < 1e-5);
-        let hexagon =
-            convex_hull((0..6).map(|i| Vec2::from_angle(i as f32 * std::f32::consts::FRAC_PI_3)));
-        let expected = 9.0 * 3.0f32.sqrt() / 4.0;
-        assert!((area(&min_triangle(&hexagon)) - expected).abs() < 1e-4);
-    }
-
-    #[test]
     fn outlines_hold_every_point_and_stay_small() {
         for seed in 0..200 {
             let points = cloud(seed, 3 + seed as usize);
@@ -377,41 +281,6 @@ mod tests {
                 sizes[3] <= sizes[2] * 1.0001 && sizes[2] <= sizes[1] * 1.0001,
                 "{sizes:?}"
             );
-        }
-    }
-
-    /// No triangle from a fine search over the directions of its three sides is smaller.
-    #[test]
-    fn no_smaller_triangle_is_found_by_brute_force() {
-        for seed in 0..8 {
-            let hull = convex_hull(cloud(seed, 9));
-            let found = f64::from(area(&min_triangle(&hull)));
-            let support = |angle: f64| {
-                let out = DVec2::from_angle(angle);
-                let far = hull.iter().map(|p| p.as_dvec2().dot(out));
-                (out * far.fold(f64::MIN, f64::max), out.perp())
-            };
-            let step = std::f64::consts::TAU / 90.0;
-            for i in 0..90 {
-                for j in i + 1..i + 45 {
-                    for k in j + 1..j + 45 {
-                        let sides = [i, j, k].map(|x| support(f64::from(x) * step));
-                        if (k - i) <= 45 {
-                            continue;
-                        }
-                        let corner = |a: usize, b: usize| {
-                            meet(sides[a].0, sides[a].1, sides[b].0, sides[b].1)
-                        };
-                        let (Some(a), Some(b), Some(c)) =
-                            (corner(0, 1), corner(1, 2), corner(2, 0))
-                        else {
-                            continue;
-                        };
-                        let size = cross(b - a, c - a) / 2.0;
-                        assert!(size >= found * 0.9999, "seed {seed}: {size} under {found}");
-                    }
-                }
-            }
         }
     }
 

@@ -3,4 +3,5 @@
 pub mod eigen;
 pub mod glb;
 pub mod hull;
+mod min_triangle;
 pub mod raster;
