@@ -1,8 +1,16 @@
 //! STEP 1: a glTF file becomes a [`Tree`].
 
+pub mod attach;
+pub mod leaf;
 pub mod load;
 pub mod model;
+pub mod organ;
+pub mod part;
+pub mod recognise;
+pub mod skeleton;
+pub mod subtree;
 pub mod tree;
 
 pub use model::Model;
+pub use recognise::recognise;
 pub use tree::Tree;

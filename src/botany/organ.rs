@@ -1,0 +1,284 @@
+//! Wood or foliage.
+//!
+//! Shape decides first: wood is made of tubes, and the outward normals of a tube cancel and turn
+//! around its axis, whereas a leaf's normals agree or oppose each other. Parts vote for their
+//! material, so that a crushed twig follows its bark. Only where a material's own parts disagree
+//! (one material for all) does each part speak for itself. Alpha settles what shape can't, and
+//! names break ties.
+
+use rayon::prelude::*;
+
+use super::leaf::signature;
+use super::model::{AlphaMode, Material, Model};
+use super::part::Parts;
+use super::recognise::RecogniseOptions;
+use super::tree::Organ;
+
+/// Normals cancel to less than this share of the area on a tube (a half pipe keeps 0.64, a
+/// leaf folded by 90 degrees 0.71).
+const CLOSED_BELOW: f64 = 0.4;
+/// `1 - trace(M^2)` of the normals' second moment: 0 on a plane, 1/2 around a tube, 2/3 on a ball.
+const ROUND_ABOVE: f64 = 0.25;
+/// Above this share of wood by triangles a whole material is wood, below its complement foliage.
+const CLEAR_MAJORITY: f64 = 0.85;
+/// Copies of a small closed shape that make it a needle or a fruit instead of a twig.
+const MANY_COPIES: usize = 64;
+
+/// How one part is shaped.
+#[derive(Clone, Copy, Debug, Default)]
+struct Shape {
+    /// Area without second sides, normalised units squared.
+    area: f64,
+    /// Length of the summed area vectors over the area: 1 flat, 0 closed.
+    openness: f64,
+    /// See [`ROUND_ABOVE`].
+    roundness: f64,
+}
+
+impl Shape {
+    fn is_tube(&self) -> bool {
+        self.openness < CLOSED_BELOW && self.roundness > ROUND_ABOVE
+    }
+}
+
+/// The organ of each part.
+pub fn classify(
+    model: &Model,
+    parts: &Parts,
+    options: &RecogniseOptions,
+    warnings: &mut Vec<String>,
+) -> Vec<Organ> {
+    let shapes: Vec<Shape> = (0..parts.triangles.len())
+        .into_par_iter()
+        .map(|part| shape(parts, part))
+        .collect();
+    let mut organs: Vec<Organ> = shapes
+        .iter()
+        .map(|s| {
+            if s.is_tube() {
+                Organ::Wood
+            } else {
+                Organ::Foliage
+            }
+        })
+        .collect();
+    let material_of = |part: usize| {
+        let triangle = parts.triangles.get(part)[0];
+        model.objects[model.triangle_object[triangle as usize] as usize].material as usize
+    };
+    let copies = copies_of_closed_parts(parts, &shapes, &organs);
+    let votes = count_votes(parts, &organs, &copies, model.materials.len(), material_of);
+    let has_tubes = votes.iter().any(|v| v.share() > CLEAR_MAJORITY);
+    for (part, organ) in organs.iter_mut().enumerate() {
+        let material = material_of(part);
+        *organ = votes[material].judge(&model.materials[material], *organ, copies[part], has_tubes);
+    }
+    keep_one_kind_of_wood(model, parts, &shapes, &mut organs, &votes, material_of);
+    apply_rules(model, parts, options, &mut organs, warnings);
+    organs
+}
+
+/// What the parts of one material say.
+#[derive(Clone, Copy, Debug, Default)]
+struct Votes {
+    wood: f64,
+    all: f64,
+    /// Triangles in tubes that have many congruent copies.
+    copied: f64,
+}
+
+impl Votes {
+    fn share(&self) -> f64 {
+        (self.wood - self.copied) / self.all.max(1.0)
+    }
+
+    fn judge(&self, material: &Material, own: Organ, copies: usize, has_tubes: bool) -> Organ {
+        let share = self.wood / self.all.max(1.0);
+        // Needles as prisms and round fruits: closed, but all alike, beside real wood.
+        let copied = copies >= MANY_COPIES && has_tubes;
+        let hint = named_organ(&material.name);
+        if self.copied > CLEAR_MAJORITY * self.all && has_tubes && hint != Some(Organ::Wood) {
+            Organ::Foliage
+        } else if share > CLEAR_MAJORITY {
+            Organ::Wood
+        } else if share < 1.0 - CLEAR_MAJORITY {
+            Organ::Foliage
+        } else if copied {
+            hint.unwrap_or(Organ::Foliage)
+        } else {
+            own
+        }
+    }
+}
+
+fn count_votes(
+    parts: &Parts,
+    organs: &[Organ],
+    copies: &[usize],
+    materials: usize,
+    material_of: impl Fn(usize) -> usize,
+) -> Vec<Votes> {
+    let mut votes = vec![Votes::default(); materials];
+    for (part, &organ) in organs.iter().enumerate() {
+        let triangles = parts.triangles.get(part).len() as f64;
+        let vote = &mut votes[material_of(part)];
+        vote.all += triangles;
+        if organ == Organ::Wood {
+            vote.wood += triangles;
+            if copies[part] >= MANY_COPIES {
+                vote.copied += triangles;
+            }
+        }
+    }
+    votes
+}
+
+/// For each tube the number of tubes that look the same (0 for all else).
+fn copies_of_closed_parts(parts: &Parts, shapes: &[Shape], organs: &[Organ]) -> Vec<usize> {
+    let total: f64 = shapes.iter().map(|s| s.area).sum();
+    let mut keys: Vec<([i64; 4], usize)> = organs
+        .par_iter()
+        .enumerate()
+        .filter(|&(part, &organ)| {
+            organ == Organ::Wood
+                && shapes[part].area < total * 1e-3
+                && parts.triangles.get(part).len() <= 256
+        })
+        .map(|(part, _)| {
+            (
+                signature(parts, parts.triangles.get(part)).coarse_key(),
+                part,
+            )
+        })
+        .collect();
+    keys.par_sort_unstable();
+    let mut copies = vec![0; organs.len()];
+    for run in keys.chunk_by(|a, b| a.0 == b.0) {
+        for &(_, part) in run {
+            copies[part] = run.len();
+        }
+    }
+    copies
+}
+
+/// A material whose parts disagree may hold closed leaves (boxes, folded blades): where another
+/// material is clearly wood, what is not clearly wood is foliage.
+fn keep_one_kind_of_wood(
+    model: &Model,
+    parts: &Parts,
+    shapes: &[Shape],
+    organs: &mut [Organ],
+    votes: &[Votes],
+    material_of: impl Fn(usize) -> usize,
+) {
+    let clear = |m: usize| votes[m].share() > CLEAR_MAJORITY;
+    let wood_area: f64 = (0..organs.len())
+        .filter(|&p| clear(material_of(p)))
+        .map(|p| shapes[p].area)
+        .sum();
+    let all_area: f64 = shapes.iter().map(|s| s.area).sum();
+    if wood_area < 0.02 * all_area {
+        return;
+    }
+    for part in 0..parts.triangles.len() {
+        let material = material_of(part);
+        let cut_out = model.materials[material].alpha_mode != AlphaMode::Opaque;
+        let foliage_by_name = named_organ(&model.materials[material].name) == Some(Organ::Foliage);
+        if !clear(material) && (cut_out || foliage_by_name) {
+            organs[part] = Organ::Foliage;
+        }
+    }
+}
+
+fn shape(parts: &Parts, part: usize) -> Shape {
+    let mut area = 0.0;
+    let mut sum = glam::DVec3::ZERO;
+    let mut moment = [0.0; 6];
+    for &t in parts.triangles.get(part) {
+        if parts.duplicate[t as usize] {
+            continue;
+        }
+        let [a, b, c] = parts.welded[t as usize].map(|p| parts.points[p as usize].as_dvec3());
+        let vector = (b - a).cross(c - a) / 2.0;
+        let size = vector.length();
+        if size > 0.0 {
+            area += size;
+            sum += vector;
+            let n = vector / size;
+            for (m, v) in moment.iter_mut().zip([
+                n.x * n.x,
+                n.y * n.y,
+                n.z * n.z,
+                n.x * n.y,
+                n.y * n.z,
+                n.z * n.x,
+            ]) {
+                *m += v * size;
+            }
+        }
+    }
+    if area == 0.0 {
+        return Shape::default();
+    }
+    let [xx, yy, zz, xy, yz, zx] = moment.map(|m| m / area);
+    let trace_of_square = xx * xx + yy * yy + zz * zz + 2.0 * (xy * xy + yz * yz + zx * zx);
+    Shape {
+        area,
+        openness: sum.length() / area,
+        roundness: 1.0 - trace_of_square,
+    }
+}
+
+/// What a name says, if it says one thing only.
+fn named_organ(name: &str) -> Option<Organ> {
+    const WOOD: [&str; 8] = [
+        "bark", "wood", "trunk", "branch", "twig", "stem", "log", "limb",
+    ];
+    const FOLIAGE: [&str; 9] = [
+        "leaf", "leaves", "foliage", "needle", "frond", "flower", "blossom", "petal", "fruit",
+    ];
+    let name = name.to_lowercase();
+    let holds = |words: &[&str]| words.iter().any(|w| name.contains(w));
+    match (holds(&WOOD), holds(&FOLIAGE)) {
+        (true, false) => Some(Organ::Wood),
+        (false, true) => Some(Organ::Foliage),
+        _ => None,
+    }
+}
+
+/// The user's rules; a rule that matches nothing is reported.
+fn apply_rules(
+    model: &Model,
+    parts: &Parts,
+    options: &RecogniseOptions,
+    organs: &mut [Organ],
+    warnings: &mut Vec<String>,
+) {
+    let needles: Vec<String> = (options.organs.iter())
+        .map(|r| r.name_contains.to_lowercase())
+        .collect();
+    let mut used = vec![false; needles.len()];
+    let rule_of_object: Vec<Option<usize>> = (model.objects.iter())
+        .map(|object| {
+            let material = &model.materials[object.material as usize].name;
+            let names = [material.to_lowercase(), object.name.to_lowercase()];
+            needles
+                .iter()
+                .position(|n| names.iter().any(|name| name.contains(n)))
+        })
+        .collect();
+    for (part, organ) in organs.iter_mut().enumerate() {
+        let triangle = parts.triangles.get(part)[0];
+        let object = model.triangle_object[triangle as usize] as usize;
+        if let Some(rule) = rule_of_object[object] {
+            *organ = options.organs[rule].organ;
+            used[rule] = true;
+        }
+    }
+    for (rule, _) in used.iter().enumerate().filter(|(_, used)| !**used) {
+        warnings.push(format!(
+            "organ rule {:?} matches no material and no object",
+            options.organs[rule].name_contains
+        ));
+    }
+}

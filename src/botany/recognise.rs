@@ -1,0 +1,71 @@
+//! Polygons become botany: parts, organs, leaves, skeleton, attachment, sub-trees.
+
+use super::model::Model;
+use super::tree::{NO_NODE, Organ, Tree};
+use super::{attach, leaf, organ, part, skeleton, subtree};
+use crate::error::{Error, Result};
+
+/// What the user may say about a model before it is recognised.
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct RecogniseOptions {
+    /// Rules that overrule what shape and material say; the first that matches wins.
+    pub organs: Vec<OrganRule>,
+}
+
+/// "Whatever has this in its name is that organ."
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+pub struct OrganRule {
+    /// Looked for in the names of material and object, upper or lower case.
+    pub name_contains: String,
+    /// What the triangles are.
+    pub organ: Organ,
+}
+
+/// Finds wood, leaves, skeleton and sub-trees of a model.
+///
+/// Works on any polygons: without wood the sub-trees are clusters of leaves, without leaves
+/// there is only a skeleton; what had to be guessed is in [`Tree::warnings`].
+///
+/// # Errors
+/// [`Error::Input`] where the model has no triangle at all.
+pub fn recognise(model: Model, options: &RecogniseOptions) -> Result<Tree> {
+    if model.triangles.is_empty() {
+        return Err(Error::input(
+            std::path::Path::new(&model.name),
+            "model",
+            "no triangle with an area is left after loading",
+            "check that the file holds a mesh of triangles",
+        ));
+    }
+    let mut warnings = Vec::new();
+    let parts = part::find(&model);
+    let mut organs = organ::classify(&model, &parts, options, &mut warnings);
+    let leaves = leaf::find(&model, &parts, &mut organs);
+    let (skeleton, wood_node) = skeleton::build(&parts, &organs, &mut warnings);
+    let mut tree = Tree {
+        organ: parts
+            .triangle_part
+            .iter()
+            .map(|&p| organs[p as usize])
+            .collect(),
+        triangle_part: parts.triangle_part,
+        part_count: parts.triangles.len() as u32,
+        leaves: leaves.leaves,
+        leaf_classes: leaves.classes,
+        skeleton,
+        wood_node,
+        model,
+        ..Tree::default()
+    };
+    attach::attach_leaves(&mut tree, &mut warnings);
+    tree.subtrees = subtree::build(&tree, &mut warnings);
+    tree.warnings = warnings;
+    debug_assert!(tree.wood_node.len() == tree.model.triangles.len());
+    debug_assert!(
+        tree.leaves
+            .iter()
+            .all(|l| l.node == NO_NODE || (l.node as usize) < tree.skeleton.nodes.len())
+    );
+    Ok(tree)
+}
