@@ -1,0 +1,67 @@
+// A headless Chromium without GPU or network, and a server that gives it this folder and the files to be drawn.
+import { createServer } from 'node:http';
+import { createReadStream, statSync } from 'node:fs';
+import { extname, join, normalize } from 'node:path';
+import { chromium } from 'playwright-core';
+
+const HERE = import.meta.dirname ?? new URL('.', import.meta.url).pathname;
+const TYPES = { '.html': 'text/html', '.js': 'text/javascript', '.mjs': 'text/javascript', '.glb': 'model/gltf-binary' };
+
+const FLAGS = [
+  '--no-sandbox',
+  '--use-angle=swiftshader',
+  '--enable-unsafe-swiftshader',
+  '--ignore-gpu-blocklist',
+  '--disable-background-networking',
+  '--disable-component-update',
+  '--disable-default-apps',
+  '--disable-sync',
+  '--no-first-run',
+];
+
+/** Serves this folder at / and `files[i]` at /file/i. */
+function serve(files) {
+  const server = createServer((request, response) => {
+    const path = normalize(decodeURIComponent(new URL(request.url, 'http://localhost').pathname));
+    const numbered = path.match(/^\/file\/(\d+)$/);
+    const file = numbered ? files[Number(numbered[1])] : join(HERE, path);
+    try {
+      statSync(file);
+    } catch {
+      response.writeHead(404).end();
+      return;
+    }
+    response.writeHead(200, { 'content-type': TYPES[extname(file)] ?? 'application/octet-stream' });
+    createReadStream(file).pipe(response);
+  });
+  return new Promise((done) => server.listen(0, '127.0.0.1', () => done(server)));
+}
+
+/** Opens `page` with `files` at hand, waits for `window.ready`, runs `work(page)` and cleans up. Page errors are errors. */
+export async function withPage(html, files, work) {
+  const server = await serve(files);
+  const browser = await chromium.launch({
+    executablePath: process.env.CHROMIUM ?? '/usr/bin/chromium',
+    args: FLAGS,
+    headless: true,
+  });
+  try {
+    const page = await browser.newPage();
+    const trouble = [];
+    page.on('pageerror', (error) => trouble.push(error.message));
+    page.on('console', (message) => {
+      if (['error', 'warning'].includes(message.type())) trouble.push(message.text());
+    });
+    page.setDefaultTimeout(600_000);
+    await page.goto(`http://127.0.0.1:${server.address().port}/${html}`);
+    try {
+      await page.waitForFunction('window.ready', undefined, { timeout: 60_000 });
+    } catch {
+      throw new Error(`the page did not start: ${trouble.join('; ') || 'no message'}`);
+    }
+    return await work(page, trouble);
+  } finally {
+    await browser.close();
+    server.close();
+  }
+}

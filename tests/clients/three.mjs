@@ -1,0 +1,116 @@
+// three.js in headless Chromium draws an original and its levels as a page shows them, and measures them against the
+// supersampled original.
+//
+//   node three.mjs ORIGINAL.glb [LEVEL.glb[@HEIGHT[,HEIGHT...]]]... [-o DIR] [--height PX,...] [--views A/E,...]
+//                  [--around N] [--fov DEGREES] [--targets]
+//
+// HEIGHT is the tree's height in pixels (default 256): a level's own, and half of it, which is twice the distance.
+// Fails if a level is empty from any side, upside down, or of another colour; with --targets also if it misses what the
+// README promises. Prints one JSON object; DIR gets three.json and a sheet of pictures for each height.
+import { mkdirSync, writeFileSync } from 'node:fs';
+import { basename, join } from 'node:path';
+import { parseArgs } from 'node:util';
+import { withPage } from './browser.mjs';
+import { summarise } from './measures.mjs';
+import { parseViews, views as defaultViews } from './views.mjs';
+
+/** A level covers at least this share of the original from every side. */
+const LEAST_AREA = 0.3;
+/** Distance of mean colours in sRGB, 0..255 a channel, that a level may have over all views. */
+const MOST_COLOUR_ERROR = 20;
+/** What the README promises: area within these bounds, F1 within this of the supersampled level. */
+const TARGET_AREA = [0.95, 1.05];
+const TARGET_F1_LOSS = 0.03;
+
+const { values: options, positionals } = parseArgs({
+  allowPositionals: true,
+  options: {
+    out: { type: 'string', short: 'o' },
+    height: { type: 'string', default: '256' },
+    views: { type: 'string' },
+    around: { type: 'string', default: '5' },
+    fov: { type: 'string', default: '0' },
+    targets: { type: 'boolean', default: false },
+  },
+});
+if (positionals.length === 0) {
+  console.error('usage: node three.mjs ORIGINAL.glb [LEVEL.glb[@HEIGHT,...]]... [-o DIR]');
+  process.exit(2);
+}
+
+const numbers = (text) => text.split(',').map(Number);
+const files = positionals.map((argument) => {
+  const [, file, heights] = argument.match(/^(.*?)(?:@([\d.,]+))?$/);
+  return { file, heights: numbers(heights ?? options.height) };
+});
+// The original is drawn at every height that a level asks for.
+files[0].heights = [...new Set(files.flatMap((f) => f.heights))].sort((a, b) => b - a);
+const views = options.views ? parseViews(options.views) : defaultViews(Number(options.around));
+const shown = [...new Set([0, 0.23, 0.42, 0.66, 0.85, 1].map((t) => Math.round(t * (views.length - 1))))];
+
+const report = await withPage('three.html', files.map((f) => f.file), async (page, trouble) => {
+  const about = await page.evaluate('about()');
+  const levels = [];
+  for (const [index, { file, heights }] of files.entries()) {
+    const job = { url: `/file/${index}`, label: basename(file), heights, views, shown, fov: Number(options.fov) };
+    const measured = await page.evaluate((j) => window.measureFile(j), job);
+    levels.push({ file, original: index === 0, ...measured });
+  }
+  if (options.out) {
+    mkdirSync(options.out, { recursive: true });
+    for (const height of files[0].heights) {
+      const url = await page.evaluate((h) => window.sheet(h), height);
+      writeFileSync(join(options.out, `three_${height}.png`), Buffer.from(url.split(',')[1], 'base64'));
+    }
+  }
+  return { client: 'three.js', ...about, trouble: [...new Set(trouble)].filter((t) => !/GPU stall/.test(t)), levels };
+});
+
+for (const level of report.levels) {
+  for (const result of level.results) {
+    const sideViews = result.views.filter((view) => Math.abs(view.elevation) < 60);
+    for (const key of ['f1', 'precision', 'recall', 'area_ratio', 'coverage_ratio']) result[key] = summarise(result.views, key);
+    result.colour_error = summarise(result.views, 'colour_error', 0);
+    result.upright = sideViews.length ? summarise(sideViews, 'upright').mean : null;
+  }
+}
+
+/** The figures of one file at one height. */
+const find = (level, mode, height) => level.results.find((r) => r.mode === mode && r.height_px === height);
+
+const faults = [...report.trouble];
+for (const level of report.levels) {
+  for (const result of level.results.filter((r) => r.mode === 'client')) {
+    const where = `${basename(level.file)} at ${result.height_px} px`;
+    const least = Math.min(...result.views.map((view) => view.area_ratio));
+    if (!level.original && least < LEAST_AREA) faults.push(`${where}: covers ${least.toFixed(2)} of the original in one view`);
+    if (level.original && result.views.some((view) => view.area_px === 0)) faults.push(`${where}: empty`);
+    if (result.upright !== null && result.upright < 0) faults.push(`${where}: looks more like the tree upside down`);
+    if (result.colour_error.mean > MOST_COLOUR_ERROR) faults.push(`${where}: mean colour is ${result.colour_error.mean.toFixed(1)} off`);
+    if (!options.targets || level.original) continue;
+    const area = result.area_ratio.mean;
+    if (area < TARGET_AREA[0] || area > TARGET_AREA[1]) faults.push(`${where}: covered area ${area.toFixed(3)}`);
+    const own = find(level, 'reference', result.height_px).f1.mean;
+    if (result.f1.mean < own - TARGET_F1_LOSS) faults.push(`${where}: F1 ${result.f1.mean.toFixed(3)}, supersampled ${own.toFixed(3)}`);
+    const tree = find(report.levels[0], 'client', result.height_px).f1.mean;
+    if (report.levels[0].alpha_cut && result.f1.mean <= tree) faults.push(`${where}: F1 ${result.f1.mean.toFixed(3)}, the original itself has ${tree.toFixed(3)}`);
+  }
+}
+report.faults = faults;
+
+const fixed = (pair) => `${pair.mean.toFixed(3)} / ${pair.worst.toFixed(3)}`;
+console.error(`three.js ${report.three}, ${report.samples} samples, ${views.length} views; mean / worst view`);
+for (const level of report.levels) {
+  for (const r of level.results) {
+    console.error(
+      `${basename(level.file).padEnd(32)} ${String(r.height_px).padStart(5)} px ${r.mode.padEnd(9)} F1 ${fixed(r.f1)}` +
+        `  area ${fixed(r.area_ratio)}  coverage ${fixed(r.coverage_ratio)}  colour ${r.colour_error.mean.toFixed(1)}` +
+        `${r.upright === null ? '' : `  upright ${r.upright.toFixed(2)}`}`,
+    );
+  }
+}
+for (const fault of faults) console.error(`FAIL ${fault}`);
+const text = JSON.stringify(report, null, 1);
+if (options.out) writeFileSync(join(options.out, 'three.json'), text);
+else console.log(text);
+process.exit(faults.length ? 1 : 0);
