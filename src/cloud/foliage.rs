@@ -69,9 +69,9 @@ pub fn faces_of(tree: &Tree, leaves: &[u32]) -> Vec<Face> {
         .collect()
 }
 
-impl Foliage<'_> {
+impl<'a> Foliage<'a> {
     /// Corners of all faces; a shared vertex comes once for each face.
-    pub fn vertices(&self) -> impl Iterator<Item = Vec3> + Clone + '_ {
+    pub fn vertices(&self) -> impl Iterator<Item = Vec3> + Clone + use<'a> {
         self.faces.iter().flat_map(|f| f.corners)
     }
 

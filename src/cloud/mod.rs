@@ -6,6 +6,7 @@ pub mod cross;
 pub mod foliage;
 pub mod occlusion;
 pub mod plane;
+pub mod strip;
 
 pub use card::{Card, Outline};
 pub use coverage::{Coverage, coverage};
