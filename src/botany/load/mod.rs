@@ -1,1 +1,114 @@
-//! Reads .glb and .gltf into a [`Model`](super::Model); every check of the input is here.
+//! Reads .glb and .gltf into a [`Model`]; every check of the input is here.
+//!
+//! After this step all indices are in range, all numbers finite, all triangles have an area and
+//! all normals length one: nobody downstream checks again. A file that can't be read is an error
+//! that names the place and what to do; what can be left out is a warning in [`Model::warnings`].
+//!
+//! ```text
+//! container  bytes        -> JSON and binary chunk
+//! buffer     JSON, URIs   -> bytes of every buffer view (meshopt decompressed)
+//! scene      nodes        -> placements: which mesh stands where
+//! primitive  accessors    -> parts: the triangles of one primitive in its own space
+//! material   textures     -> materials and decoded images
+//! normalise  placed parts -> the model in normalised space
+//! ```
+
+mod accessor;
+mod buffer;
+mod container;
+mod image;
+mod json;
+mod material;
+mod meshopt;
+mod normalise;
+mod primitive;
+mod scene;
+mod uri;
+mod warning;
+
+use std::path::Path;
+
+use super::model::Model;
+use crate::{Error, Result};
+use buffer::Asset;
+use warning::Warnings;
+
+/// How large an input may be; beyond it, [`load_with`] ends with an error that names the limit.
+///
+/// The defaults are far above any tree that was seen, and low enough that a broken or hostile
+/// file ends in an error instead of an exhausted machine.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Limits {
+    /// Triangles after instances are expanded.
+    pub triangles: usize,
+    /// Texels of all decoded images together (4 bytes each).
+    pub pixels: u64,
+    /// Nodes of the scene, and placed primitives (instances count one each).
+    pub nodes: usize,
+    /// Bytes of the file, its external files, and of all decompressed buffers, each for itself.
+    pub bytes: u64,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self {
+            triangles: 50_000_000,
+            pixels: 1 << 29,
+            nodes: 8_000_000,
+            bytes: 1 << 32,
+        }
+    }
+}
+
+/// Reads a .glb or .gltf file with its external buffers and images, within the default [`Limits`].
+///
+/// # Errors
+/// [`Error::Io`] where a file can't be read, [`Error::Input`] where its content can't be used.
+pub fn load(path: &Path) -> Result<Model> {
+    load_with(path, &Limits::default())
+}
+
+/// Reads a .glb or .gltf file within the given limits.
+///
+/// # Errors
+/// As [`load`].
+pub fn load_with(path: &Path, limits: &Limits) -> Result<Model> {
+    let bytes = container::read_file(path, limits)?;
+    load_slice(&bytes, path, limits)
+}
+
+/// Reads a .glb or .gltf that is already in memory; `path` names it and anchors relative URIs.
+///
+/// # Errors
+/// As [`load`].
+pub fn load_slice(bytes: &[u8], path: &Path, limits: &Limits) -> Result<Model> {
+    let (document, chunk) = container::open(bytes, path)?;
+    let mut warnings = Warnings::default();
+    container::check_extensions(&document, path, &mut warnings)?;
+    let asset = Asset::open(path, &document, bytes.len() as u64, chunk, limits)?;
+
+    let placements = scene::placements(&asset, &mut warnings)?;
+    let mut materials = material::Materials::new(&asset, &placements, &mut warnings)?;
+    let parts = primitive::read_all(&asset, &placements, &materials, &mut warnings)?;
+    let mut model = normalise::assemble(&asset, placements, parts, &mut warnings)?;
+    let mut file_bytes = asset.file_bytes;
+    model.images = image::decode_all(&asset, &materials.images, &mut file_bytes)?;
+    model.materials = std::mem::take(&mut materials.list);
+    model.file_bytes = file_bytes;
+    model.name = path
+        .file_stem()
+        .map(|s| s.to_string_lossy().into_owned())
+        .unwrap_or_default();
+    model.warnings = warnings.into_lines();
+    Ok(model)
+}
+
+/// Shorthand for an input error of one file.
+fn fault(
+    path: &Path,
+    place: impl Into<String>,
+    what: impl Into<String>,
+    help: impl Into<String>,
+) -> Error {
+    Error::input(path, place, what, help)
+}

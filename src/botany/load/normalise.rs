@@ -1,0 +1,193 @@
+//! Placed parts become one model in normalised space.
+//!
+//! World positions are computed in f64 and never stored: the bounds are a first pass over them,
+//! the model the second, so a tree 10^7 m from the origin loses nothing that the file still had.
+
+use glam::{DMat3, DMat4, DVec3, Vec2, Vec3};
+
+use super::buffer::Asset;
+use super::primitive::{DEGENERATE, Part, Parts};
+use super::scene::Placement;
+use super::warning::Warnings;
+use crate::Result;
+use crate::botany::model::{Frame, Model, Object};
+
+/// Doubled area (radius one) below which a triangle has none: products of steps of the f32 grid.
+const LEAST_AREA: f64 = 1e-15;
+
+/// Builds the model, without materials and images.
+pub(super) fn assemble(
+    asset: &Asset,
+    placements: Vec<Placement>,
+    parts: Parts,
+    warnings: &mut Warnings,
+) -> Result<Model> {
+    check_size(asset, &placements, &parts)?;
+    let frame = frame(asset, &placements, &parts)?;
+    let placed = || {
+        placements
+            .iter()
+            .flat_map(|p| parts[p.mesh].iter().map(move |part| (p, part)))
+    };
+    let colored = placed().any(|(_, part)| !part.colors.is_empty());
+    let second = placed().any(|(_, part)| !part.uvs[1].is_empty());
+    let mut model = Model {
+        frame,
+        ..Model::default()
+    };
+    for (placement, part) in placed() {
+        let dropped = append(&mut model, placement, part, (colored, second));
+        warnings.count(DEGENERATE, dropped, &placement.name);
+    }
+    if model.triangles.is_empty() {
+        return Err(nothing(asset));
+    }
+    Ok(model)
+}
+
+fn nothing(asset: &Asset) -> crate::Error {
+    asset.fault(
+        "scene",
+        "it shows no triangles",
+        "check that the tree is a mesh (not a curve) and in the exported scene",
+    )
+}
+
+fn check_size(asset: &Asset, placements: &[Placement], parts: &Parts) -> Result<()> {
+    let count = |p: &Placement| {
+        parts[p.mesh]
+            .iter()
+            .map(|part| part.triangles.len())
+            .sum::<usize>()
+    };
+    let mut total = 0usize;
+    for placement in placements {
+        total = total.saturating_add(count(placement));
+        if total > asset.limits.triangles {
+            let what = format!(
+                "the scene has more than the limit of {} triangles",
+                asset.limits.triangles
+            );
+            return Err(asset.fault("scene", what, "split the scene: one tree a file"));
+        }
+    }
+    Ok(())
+}
+
+/// Centre of the bounding box, and the largest distance from it.
+fn frame(asset: &Asset, placements: &[Placement], parts: &Parts) -> Result<Frame> {
+    let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    for_each_point(placements, parts, |p| {
+        (low, high) = (low.min(p), high.max(p))
+    });
+    if low.x > high.x {
+        return Err(nothing(asset));
+    }
+    let center = low + 0.5 * (high - low);
+    let mut radius = 0.0f64;
+    for_each_point(placements, parts, |p| {
+        radius = radius.max((p - center).length())
+    });
+    // A point that is not a number would pass by min and max unseen.
+    let mut finite = center.is_finite() && radius.is_finite();
+    for_each_point(placements, parts, |p| finite &= p.is_finite());
+    if !finite || radius < f64::from(f32::MIN_POSITIVE) * f64::EPSILON {
+        let what = format!("the tree reaches from {low} to {high}");
+        return Err(asset.fault("scene", what, "apply transforms before the export"));
+    }
+    Ok(Frame { center, radius })
+}
+
+fn for_each_point(placements: &[Placement], parts: &Parts, mut act: impl FnMut(DVec3)) {
+    for placement in placements {
+        // An object scaled to nothing (a hidden one) is nowhere.
+        if placement.world_from_mesh.x_axis.truncate() == DVec3::ZERO
+            && placement.world_from_mesh.y_axis.truncate() == DVec3::ZERO
+            && placement.world_from_mesh.z_axis.truncate() == DVec3::ZERO
+        {
+            continue;
+        }
+        for part in &parts[placement.mesh] {
+            for p in &part.positions {
+                act(placement.world_from_mesh.transform_point3(p.as_dvec3()));
+            }
+        }
+    }
+}
+
+/// Adds one placed part; returns how many triangles lost their area.
+fn append(
+    model: &mut Model,
+    placement: &Placement,
+    part: &Part,
+    (colored, second): (bool, bool),
+) -> u64 {
+    let Frame { center, radius } = model.frame;
+    let base = model.positions.len() as u32;
+    let matrix = placement.world_from_mesh;
+    let place = |p: &Vec3| ((matrix.transform_point3(p.as_dvec3()) - center) / radius).as_vec3();
+    model.positions.extend(part.positions.iter().map(place));
+
+    // Triangles; a mirror turns them round (glTF 2.0, section 3.7.4).
+    let mirrored = matrix.determinant() < 0.0;
+    let object = model.objects.len() as u32;
+    let before = model.triangles.len();
+    for &[a, b, c] in &part.triangles {
+        let t = if mirrored { [a, c, b] } else { [a, b, c] }.map(|i| base + i);
+        let [a, b, c] = t.map(|i| model.positions[i as usize].as_dvec3());
+        if (b - a).cross(c - a).length() > LEAST_AREA {
+            model.triangles.push(t);
+        }
+    }
+    let kept = model.triangles.len() - before;
+    if kept == 0 {
+        model.positions.truncate(base as usize);
+        return part.triangles.len() as u64;
+    }
+    model.triangle_object.resize(model.triangles.len(), object);
+    model.objects.push(Object {
+        name: placement.name.clone(),
+        mesh: placement.mesh as u32,
+        primitive: part.primitive as u32,
+        material: part.material,
+    });
+
+    let turn = normal_matrix(matrix);
+    let normal = |n: &Vec3| {
+        (turn * n.as_dvec3())
+            .try_normalize()
+            .map_or(*n, |n| n.as_vec3())
+    };
+    model.normals.extend(part.normals.iter().map(normal));
+    let total = model.positions.len();
+    for (slot, list) in model.uvs.iter_mut().enumerate() {
+        if slot == 0 || second {
+            list.extend_from_slice(&part.uvs[slot]);
+            list.resize(total, Vec2::ZERO);
+        }
+    }
+    if colored {
+        model.colors.extend_from_slice(&part.colors);
+        model.colors.resize(total, [1.0; 4]);
+    }
+    (part.triangles.len() - kept) as u64
+}
+
+/// Inverse transpose up to scale: the cofactors, which a flattened matrix has too.
+fn normal_matrix(matrix: DMat4) -> DMat3 {
+    let m = DMat3::from_mat4(matrix);
+    // Scaled first: cofactors of tiny matrices would underflow.
+    let largest = m.to_cols_array().iter().fold(0.0f64, |a, x| a.max(x.abs()));
+    let m = if largest > 0.0 {
+        m * (1.0 / largest)
+    } else {
+        m
+    };
+    let (x, y, z) = (m.x_axis, m.y_axis, m.z_axis);
+    let cofactors = DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y));
+    if m.determinant() < 0.0 {
+        cofactors * -1.0
+    } else {
+        cofactors
+    }
+}
