@@ -283,7 +283,7 @@ fn back_faces_are_drawn_only_if_double_sided() {
     assert_eq!(coverage(&scene, &camera(), GRID4).area(), 4.0);
     // The normal of a back face is turned towards the eye.
     let picture = draw(&scene, &camera(), GRID4).shade(&scene, &camera(), GRID4, Light::Unlit);
-    assert!(picture.normal.iter().any(|n| *n == Vec3::NEG_Z));
+    assert!(picture.normal.contains(&Vec3::NEG_Z));
 }
 
 /// A closed ball of triangles of very different sizes, turned so that no edge is straight.
@@ -399,9 +399,10 @@ fn triangles_behind_or_far_outside_are_left_out() {
         coverage(&scene(&shape, &opaque(), &[]), &behind, GRID4).area(),
         0.0
     );
+    // Half of four pixels, less half of the eight samples on the diagonal: they belonged to the other half.
     assert_eq!(
         coverage(&scene(&shape, &opaque(), &[]), &camera(), GRID4).area(),
-        2.0
+        1.75
     );
 }
 

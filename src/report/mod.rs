@@ -1,1 +1,19 @@
 //! STEP 5: reads the package back and measures it against the original.
+//!
+//! What is measured is what was written: files are loaded again and drawn over the original's
+//! pictures, supersampled and as an engine draws them.
+
+mod contact;
+mod cost;
+mod drawable;
+mod evaluate;
+mod reference;
+pub mod schema;
+mod silhouette;
+
+pub use contact::contact_sheet;
+pub use cost::{draw_calls, texture_bytes};
+pub use drawable::Drawable;
+pub use evaluate::{Settings, evaluate};
+pub use reference::Reference;
+pub use silhouette::{Agreement, agreement};

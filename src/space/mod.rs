@@ -5,3 +5,4 @@ pub mod glb;
 pub mod hull;
 mod min_triangle;
 pub mod raster;
+pub mod view;

@@ -98,29 +98,47 @@ impl Mask {
     /// Exactly what a shifted camera would draw, since corners snap to parts of a sample; only
     /// what would come in from outside is missing.
     pub fn coverage_shifted(&self, right: i32, down: i32) -> Coverage {
-        let (side, row) = (self.side as i32, (self.width * self.side) as i32);
-        let rows = (self.height * self.side) as i32;
-        let mut fraction = Vec::with_capacity((self.width * self.height) as usize);
-        let scale = 1.0 / (side * side) as f32;
-        for y in 0..self.height as i32 {
-            for x in 0..self.width as i32 {
-                let mut sum = 0u32;
-                for sy in (y * side - down).max(0)..((y + 1) * side - down).min(rows) {
-                    let from = (x * side - right).max(0);
-                    let to = ((x + 1) * side - right).min(row);
-                    if from < to {
-                        let at = (sy * row) as usize;
-                        let samples = &self.samples[at + from as usize..at + to as usize];
-                        sum += samples.iter().map(|&s| s as u32).sum::<u32>();
+        let (side, row) = (self.side as usize, (self.width * self.side) as usize);
+        let shift = right.clamp(-(row as i32), row as i32);
+        let mut moved = vec![0u8; row];
+        let mut sums = vec![0u32; (self.width * self.height) as usize];
+        for (y, samples) in self.samples.chunks_exact(row).enumerate() {
+            let y = (y as i64 + down as i64).div_euclid(side as i64);
+            if y < 0 || y >= self.height as i64 {
+                continue;
+            }
+            let samples = if shift == 0 {
+                samples
+            } else {
+                let (gap, kept) = (
+                    shift.unsigned_abs() as usize,
+                    row - shift.unsigned_abs() as usize,
+                );
+                if shift > 0 {
+                    moved[gap..].copy_from_slice(&samples[..kept]);
+                } else {
+                    moved[..kept].copy_from_slice(&samples[gap..]);
+                }
+                &moved
+            };
+            let at = y as usize * self.width as usize;
+            let sums = &mut sums[at..at + self.width as usize];
+            match side {
+                1 => add_row::<1>(sums, samples),
+                2 => add_row::<2>(sums, samples),
+                4 => add_row::<4>(sums, samples),
+                _ => {
+                    for (sum, pixel) in sums.iter_mut().zip(samples.chunks_exact(side)) {
+                        *sum += pixel.iter().map(|&s| s as u32).sum::<u32>();
                     }
                 }
-                fraction.push(sum as f32 * scale);
             }
         }
+        let scale = 1.0 / (side * side) as f32;
         Coverage {
             width: self.width,
             height: self.height,
-            fraction,
+            fraction: sums.into_iter().map(|sum| sum as f32 * scale).collect(),
         }
     }
 
@@ -140,5 +158,13 @@ impl Coverage {
     /// Whether a pixel is at least half covered.
     pub fn silhouette(&self) -> Vec<bool> {
         self.fraction.iter().map(|&c| c >= 0.5).collect()
+    }
+}
+
+/// Adds a row of samples to the pixels' sums; a fixed side lets the compiler use wide registers.
+fn add_row<const SIDE: usize>(sums: &mut [u32], samples: &[u8]) {
+    let (pixels, _) = samples.as_chunks::<SIDE>();
+    for (sum, pixel) in sums.iter_mut().zip(pixels) {
+        *sum += pixel.iter().map(|&s| s as u32).sum::<u32>();
     }
 }

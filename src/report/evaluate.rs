@@ -1,0 +1,122 @@
+//! All figures of a set of levels against their original.
+
+use rayon::prelude::*;
+
+use super::cost::{draw_calls, texture_bytes};
+use super::drawable::Drawable;
+use super::reference::Reference;
+use super::schema::{Level, Report, SizeFigures};
+use crate::botany::Model;
+use crate::space::raster::{Sampling, coverage_with_stats};
+use crate::space::view::{DEFAULT_VIEWS, View, views};
+
+/// How levels are evaluated.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    /// Heights of the tree on the screen, pixels.
+    pub heights_px: Vec<u32>,
+    /// Number of views, the top included (at least; see [`views`]).
+    pub views: usize,
+    /// Azimuth of the first view, degrees.
+    pub azimuth_offset_deg: f32,
+    /// Whether levels and original are also drawn as an engine draws them.
+    pub client: bool,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            heights_px: vec![256, 64],
+            views: DEFAULT_VIEWS,
+            azimuth_offset_deg: 0.0,
+            client: false,
+        }
+    }
+}
+
+impl Settings {
+    /// The views that these settings ask for.
+    pub fn view_set(&self) -> Vec<View> {
+        views(self.views, self.azimuth_offset_deg)
+    }
+}
+
+/// Lines of the screen that distances are stated for.
+const SCREEN_LINES: f64 = 1080.0;
+/// Vertical field of view that distances are stated for, degrees.
+const FIELD_OF_VIEW_DEG: f64 = 60.0;
+
+/// Measures `levels` (with their file names) against `original`.
+pub fn evaluate(
+    original: (&Model, &str),
+    levels: &[(&Model, &str)],
+    settings: &Settings,
+) -> Report {
+    let views = settings.view_set();
+    let all: Vec<(&Model, &str)> = [original]
+        .into_iter()
+        .chain(levels.iter().copied())
+        .collect();
+    let drawables: Vec<Drawable> = all.iter().map(|(m, _)| Drawable::silhouette(m)).collect();
+    let mut rows: Vec<Level> = all
+        .iter()
+        .zip(&drawables)
+        .map(|(&(model, file), drawable)| Level {
+            file: file.into(),
+            triangles: model.triangles.len() as u64,
+            draw_calls: draw_calls(model),
+            texture_bytes: texture_bytes(model),
+            file_bytes: model.file_bytes,
+            distance_m: distance_m(original.0, settings),
+            overdraw: overdraw(drawable, original.0, &views),
+            ..Level::default()
+        })
+        .collect();
+    for (number, row) in rows.iter_mut().skip(1).enumerate() {
+        row.level = number as u32 + 1;
+    }
+    for &height_px in &settings.heights_px {
+        let reference = Reference::of(&drawables[0], original.0, &views, height_px);
+        for (row, drawable) in rows.iter_mut().zip(&drawables) {
+            row.sizes
+                .push(measure(&reference, drawable, settings.client));
+        }
+    }
+    let levels = rows.split_off(1);
+    Report {
+        original: rows.pop(),
+        levels,
+        ..Report::default()
+    }
+}
+
+fn measure(reference: &Reference, level: &Drawable, client: bool) -> SizeFigures {
+    let mut figures = reference.compare_drawable(level, Sampling::REFERENCE);
+    if client {
+        let drawn = reference.compare_drawable(level, Sampling::CLIENT);
+        figures.client = Some(Box::new(drawn));
+    }
+    figures
+}
+
+/// Distance at which the tree has the first height on the screen, metres.
+fn distance_m(original: &Model, settings: &Settings) -> f64 {
+    let Some(&height_px) = settings.heights_px.first() else {
+        return 0.0;
+    };
+    let height_m = original.height() as f64 * original.frame.radius;
+    let half_angle = (FIELD_OF_VIEW_DEG / 2.0).to_radians();
+    height_m * SCREEN_LINES / (2.0 * height_px as f64 * half_angle.tan())
+}
+
+/// Fragments a covered sample, mean over views; hardly depends on the size on the screen.
+fn overdraw(level: &Drawable, original: &Model, views: &[View]) -> f64 {
+    let place = level.placement_in(original.frame);
+    let in_view = |view: &View| {
+        let camera = view.camera(original.height(), 256).placed(place);
+        let (_, stats) = coverage_with_stats(&level.scene(), &camera, Sampling::CLIENT);
+        stats.fragments as f64 / stats.covered.max(1) as f64
+    };
+    let each: Vec<f64> = views.par_iter().map(in_view).collect();
+    each.iter().sum::<f64>() / each.len().max(1) as f64
+}

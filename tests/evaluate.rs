@@ -1,0 +1,184 @@
+//! Figures of levels against originals whose answers are known.
+
+use glam::{DVec3, Vec2, Vec3};
+use pleach::botany::Model;
+use pleach::botany::model::{AlphaMode, Frame, Image, Material, Object, TextureRef, Wrap};
+use pleach::report::{Drawable, Reference, Settings, evaluate};
+use pleach::space::raster::{Sampling, coverage};
+use pleach::space::view::views;
+
+/// A crown of quads, scattered by a fixed sequence; every `keep`-th one is left out if `keep > 0`.
+fn crown(quads: u32, leave_out: u32) -> Model {
+    let mut model = Model {
+        materials: vec![Material {
+            double_sided: true,
+            ..Material::default()
+        }],
+        objects: vec![Object::default()],
+        ..Model::default()
+    };
+    let random = |i: u32, k: u32| ((i * 7919 + k * 104_729) as f32 * 0.618_034).fract() - 0.5;
+    for i in 0..quads {
+        let center = Vec3::new(random(i, 1), random(i, 2) * 1.6, random(i, 3));
+        if leave_out > 0 && i % leave_out == 0 {
+            continue;
+        }
+        let u = Vec3::new(random(i, 4), random(i, 5), random(i, 6)).normalize_or(Vec3::X) * 0.04;
+        let v = u
+            .cross(Vec3::new(random(i, 7), random(i, 8), random(i, 9)))
+            .normalize_or(Vec3::Y)
+            * 0.04;
+        quad(&mut model, center, u, v);
+    }
+    model
+}
+
+fn quad(model: &mut Model, center: Vec3, u: Vec3, v: Vec3) {
+    let at = model.positions.len() as u32;
+    model.positions.extend([
+        center - u - v,
+        center + u - v,
+        center + u + v,
+        center - u + v,
+    ]);
+    model.normals.extend([u.cross(v).normalize(); 4]);
+    model.uvs[0].extend([[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]].map(Vec2::from));
+    model
+        .triangles
+        .extend([[at, at + 1, at + 2], [at, at + 2, at + 3]]);
+    model.triangle_object.extend([0, 0]);
+}
+
+#[test]
+fn the_original_has_no_error_and_an_empty_level_all_of_it() {
+    let original = crown(600, 0);
+    let reference = Reference::new(&original, &views(16, 0.0), 128);
+    let own = reference.compare(&original, Sampling::REFERENCE);
+    assert_eq!(
+        (own.f1.worst, own.shift_ratio, own.area_ratio.worst),
+        (1.0, 0.0, 1.0)
+    );
+    let empty = Model {
+        materials: original.materials.clone(),
+        ..Model::default()
+    };
+    let none = reference.compare(&empty, Sampling::REFERENCE);
+    assert_eq!((none.f1.mean, none.recall.mean), (0.0, 0.0));
+    assert!(none.area_ratio.mean < 1e-4);
+}
+
+#[test]
+fn the_original_moved_by_half_a_pixel_has_a_shift_ratio_of_one() {
+    let original = crown(600, 0);
+    let set = views(16, 10.0);
+    let reference = Reference::new(&original, &set, 128);
+    // Moved along x in some views and y in others would mix both; so measure by cameras.
+    let drawable = Drawable::silhouette(&original);
+    let mut sum = 0.0;
+    for view in &set {
+        let camera = view.camera(original.height(), 128);
+        let draw = |c| coverage(&drawable.scene(), &c, Sampling::REFERENCE).coverage();
+        let still = draw(camera);
+        for (x, y) in [(0.5, 0.0), (0.0, 0.5)] {
+            let moved = draw(camera.shifted(x, y));
+            sum += pleach::report::agreement(&still, &moved).f1() / 2.0;
+        }
+    }
+    let f1 = sum / set.len() as f64;
+    assert!((f1 - reference.shifted_f1()).abs() < 1e-12);
+    assert!((reference.shift_ratio(f1) - 1.0).abs() < 1e-9);
+    assert!(f1 > 0.5 && f1 < 0.99, "{f1}");
+}
+
+#[test]
+fn leaving_out_leaves_costs_recall_alone() {
+    let original = crown(600, 0);
+    let level = crown(600, 5);
+    let figures =
+        Reference::new(&original, &views(16, 0.0), 128).compare(&level, Sampling::REFERENCE);
+    assert_eq!(figures.precision.worst, 1.0);
+    assert!(
+        figures.recall.mean < 0.98 && figures.recall.mean > 0.9,
+        "{:?}",
+        figures.recall
+    );
+    assert!(figures.area_ratio.mean < 0.98);
+    assert!(figures.f1.worst <= figures.f1.mean);
+    assert_eq!(figures.views.len(), 16);
+}
+
+#[test]
+fn a_file_with_another_frame_is_put_in_its_place() {
+    let mut original = crown(400, 0);
+    original.frame = Frame {
+        center: DVec3::new(1e5, 3.0, -7.0),
+        radius: 8.0,
+    };
+    // The same tree, normalised about another centre by another radius.
+    let mut level = original.clone();
+    level.frame = Frame {
+        center: original.frame.center + DVec3::new(0.8, -0.4, 0.2),
+        radius: 10.0,
+    };
+    for p in &mut level.positions {
+        *p = (*p * 8.0 - Vec3::new(0.8, -0.4, 0.2)) / 10.0;
+    }
+    let figures =
+        Reference::new(&original, &views(16, 0.0), 128).compare(&level, Sampling::REFERENCE);
+    // Rounding may move a corner over a sample.
+    assert!(figures.f1.worst > 0.999, "{:?}", figures.f1);
+}
+
+#[test]
+fn a_client_loses_area_where_mips_thin_the_leaves() {
+    let mut original = crown(600, 0);
+    // Leaves that cover a fifth of their quads: their mips fall under the cutoff.
+    let rgba = (0..64 * 64)
+        .flat_map(|i| [90, 120, 40, if i % 64 % 16 < 3 { 255 } else { 0 }])
+        .collect();
+    original.images.push(Image {
+        width: 64,
+        height: 64,
+        rgba,
+        ..Image::default()
+    });
+    original.materials[0].alpha_mode = AlphaMode::Mask;
+    original.materials[0].base_color = Some(TextureRef {
+        image: 0,
+        uv_set: 0,
+        wrap: [Wrap::Repeat; 2],
+        linear: true,
+    });
+    let settings = Settings {
+        heights_px: vec![64],
+        client: true,
+        ..Settings::default()
+    };
+    let report = evaluate((&original, "a.glb"), &[(&original, "b.glb")], &settings);
+    let level = &report.levels[0].sizes[0];
+    assert_eq!(level.f1.worst, 1.0);
+    let client = level.client.as_ref().unwrap();
+    assert!(client.area_ratio.mean < 0.3, "{:?}", client.area_ratio);
+    assert_eq!(
+        report.levels[0].texture_bytes,
+        4 * (4096 + 1024 + 256 + 64 + 16 + 4 + 1)
+    );
+}
+
+#[test]
+fn threads_do_not_change_a_figure() {
+    let (original, level) = (crown(500, 0), crown(500, 7));
+    let settings = Settings {
+        client: true,
+        ..Settings::default()
+    };
+    let run = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap();
+        let report = pool.install(|| evaluate((&original, "a"), &[(&level, "b")], &settings));
+        serde_json::to_string(&report).unwrap()
+    };
+    assert_eq!(run(1), run(2));
+}
