@@ -1,1 +1,3 @@
 //! STEP 3: billboards become levels of detail.
+
+pub mod wood;
