@@ -4,5 +4,6 @@ pub mod eigen;
 pub mod glb;
 pub mod hull;
 mod min_triangle;
+pub mod polyline;
 pub mod raster;
 pub mod view;
