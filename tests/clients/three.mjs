@@ -2,7 +2,7 @@
 // supersampled original.
 //
 //   node three.mjs ORIGINAL.glb [LEVEL.glb[@HEIGHT[,HEIGHT...]]]... [-o DIR] [--height PX,...] [--views A/E,...]
-//                  [--around N] [--fov DEGREES] [--targets]
+//                  [--around N] [--offset DEGREES] [--fov DEGREES] [--targets]
 //
 // HEIGHT is the tree's height in pixels (default 256): a level's own, and half of it, which is twice the distance.
 // Fails if a level is empty from any side, upside down, or of another colour; with --targets also if it misses what the
@@ -29,6 +29,7 @@ const { values: options, positionals } = parseArgs({
     height: { type: 'string', default: '256' },
     views: { type: 'string' },
     around: { type: 'string', default: '5' },
+    offset: { type: 'string', default: '0' },
     fov: { type: 'string', default: '0' },
     targets: { type: 'boolean', default: false },
   },
@@ -45,7 +46,7 @@ const files = positionals.map((argument) => {
 });
 // The original is drawn at every height that a level asks for.
 files[0].heights = [...new Set(files.flatMap((f) => f.heights))].sort((a, b) => b - a);
-const views = options.views ? parseViews(options.views) : defaultViews(Number(options.around));
+const views = options.views ? parseViews(options.views) : defaultViews(Number(options.around), Number(options.offset));
 const shown = [...new Set([0, 0.23, 0.42, 0.66, 0.85, 1].map((t) => Math.round(t * (views.length - 1))))];
 
 const report = await withPage('three.html', files.map((f) => f.file), async (page, trouble) => {
@@ -69,7 +70,7 @@ const report = await withPage('three.html', files.map((f) => f.file), async (pag
 for (const level of report.levels) {
   for (const result of level.results) {
     const sideViews = result.views.filter((view) => Math.abs(view.elevation) < 60);
-    for (const key of ['f1', 'precision', 'recall', 'area_ratio', 'coverage_ratio']) result[key] = summarise(result.views, key);
+    for (const key of ['f1', 'precision', 'recall', 'area_ratio', 'half_area_ratio']) result[key] = summarise(result.views, key);
     result.colour_error = summarise(result.views, 'colour_error', 0);
     result.upright = sideViews.length ? summarise(sideViews, 'upright').mean : null;
   }
@@ -104,7 +105,7 @@ for (const level of report.levels) {
   for (const r of level.results) {
     console.error(
       `${basename(level.file).padEnd(32)} ${String(r.height_px).padStart(5)} px ${r.mode.padEnd(9)} F1 ${fixed(r.f1)}` +
-        `  area ${fixed(r.area_ratio)}  coverage ${fixed(r.coverage_ratio)}  colour ${r.colour_error.mean.toFixed(1)}` +
+        `  area ${fixed(r.area_ratio)}  half ${fixed(r.half_area_ratio)}  colour ${r.colour_error.mean.toFixed(1)}` +
         `${r.upright === null ? '' : `  upright ${r.upright.toFixed(2)}`}`,
     );
   }

@@ -5,45 +5,11 @@
 import { readFileSync } from 'node:fs';
 import { basename } from 'node:path';
 import validator from 'gltf-validator';
-import { readGlbJson, reachable, sceneRoots, trianglesInScene } from './glb.mjs';
+import { readGlbJson, trianglesInScene } from './glb.mjs';
+import { lodFaults } from './levels.mjs';
 
 /** Files that hold one level, for clients that know no extension at all. */
 const SINGLE_LEVEL = /_LOD\d+\.glb$/;
-
-/** Everything wrong in the level chains of a file (extension MSFT_lod). */
-function lodFaults(gltf) {
-  const faults = [];
-  const drawn = reachable(gltf, sceneRoots(gltf));
-  (gltf.nodes ?? []).forEach((node, index) => {
-    const ids = node.extensions?.MSFT_lod?.ids;
-    if (!ids) return;
-    if (!gltf.extensionsUsed?.includes('MSFT_lod')) faults.push('MSFT_lod is not in extensionsUsed');
-    if (!drawn.has(index)) faults.push(`node ${index} has levels but is not in the scene`);
-    if (ids.length === 0) faults.push(`node ${index}: no levels`);
-    if (new Set(ids).size !== ids.length) faults.push(`node ${index}: a level is listed twice`);
-    for (const id of ids) {
-      if (!gltf.nodes[id]) {
-        faults.push(`node ${index}: level ${id} does not exist`);
-        continue;
-      }
-      const level = reachable(gltf, [id]);
-      if ([...level].some((n) => drawn.has(n))) faults.push(`node ${index}: level ${id} is drawn with the scene`);
-      if (![...level].some((n) => gltf.nodes[n].mesh !== undefined)) faults.push(`node ${index}: level ${id} is empty`);
-    }
-    faults.push(...coverageFaults(node.extras?.MSFT_screencoverage, ids.length + 1).map((f) => `node ${index}: ${f}`));
-  });
-  return faults;
-}
-
-/** One number for each level, level 0 included, each smaller than the one before, in [0, 1]. */
-function coverageFaults(coverage, levels) {
-  if (!Array.isArray(coverage)) return ['no extras.MSFT_screencoverage'];
-  const faults = [];
-  if (coverage.length !== levels) faults.push(`${coverage.length} screen coverages for ${levels} levels`);
-  if (coverage.some((c) => typeof c !== 'number' || !(c >= 0 && c <= 1))) faults.push('screen coverage outside 0..1');
-  if (coverage.some((c, i) => i > 0 && !(c < coverage[i - 1]))) faults.push('screen coverages do not decrease');
-  return faults;
-}
 
 /** What makes clients refuse a file, or show less than all of it. */
 function portabilityFaults(gltf, file) {

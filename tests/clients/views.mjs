@@ -1,16 +1,14 @@
-// From where a tree is looked at: the views of `pleach evaluate`, azimuths at three elevations, and the top.
+// From where a tree is looked at: the views of `pleach evaluate`.
 
-const ELEVATIONS = [-15, 0, 30];
+const ELEVATIONS = [0, 30, -15];
 
-/** `around` azimuths at each elevation, the rings turned against each other, and the top; degrees. */
-export function views(around = 5) {
+/** `around` azimuths at each elevation, and the top; degrees. `offset` turns them: other views than those fitted to. */
+export function views(around, offset = 0) {
   const list = [];
-  ELEVATIONS.forEach((elevation, ring) => {
-    for (let i = 0; i < around; i++) {
-      list.push({ azimuth: ((i + ring / ELEVATIONS.length) * 360) / around, elevation });
-    }
-  });
-  return [...list, { azimuth: 0, elevation: 90 }];
+  for (const elevation of ELEVATIONS) {
+    for (let i = 0; i < around; i++) list.push({ azimuth: (i * 360) / around + offset, elevation });
+  }
+  return [...list, { azimuth: offset, elevation: 90 }];
 }
 
 /** "0/0,45/30,0/90" as views. */
