@@ -1,1 +1,48 @@
 //! Recipe: every knob of a bake with unit, range and default; presets draft, balanced, best.
+
+use serde::{Deserialize, Serialize};
+
+/// How a tree is baked. Read from RON; keys that are left out keep the preset's value.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Recipe {
+    /// Weight of the squared spread inside a card's plane against the squared distance to it (no
+    /// unit, 0 to 1): more makes compact cards that need fewer texels and fit less well.
+    pub locality: f64,
+    /// Rounds in which leaves move to nearer planes after the cut, 0 to 100.
+    pub reassign_rounds: u32,
+    /// Texels a pixel at the distance where a level starts, 0.25 to 4.
+    pub texel_density: f32,
+    /// Transparent texels around each card, 0 to 16.
+    pub gutter_texels: f32,
+    /// Sub-samples a texel along each axis, 1 to 8.
+    pub samples: u32,
+    /// Rounds in which texels are fitted to the original's silhouettes; 0 leaves them as projected.
+    pub refine_rounds: u32,
+    /// Training views of the fit and of the area match, 4 to 64.
+    pub training_views: u32,
+    /// Outline of a card: one triangle or a rectangle of two.
+    pub triangular_cards: bool,
+}
+
+impl Default for Recipe {
+    fn default() -> Self {
+        Self::balanced()
+    }
+}
+
+impl Recipe {
+    /// The default: accuracy that is worth its time.
+    pub fn balanced() -> Self {
+        Self {
+            locality: 0.01,
+            reassign_rounds: 12,
+            texel_density: 1.0,
+            gutter_texels: 1.0,
+            samples: 4,
+            refine_rounds: 6,
+            training_views: 24,
+            triangular_cards: true,
+        }
+    }
+}

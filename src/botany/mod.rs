@@ -6,7 +6,6 @@ pub mod load;
 pub mod model;
 pub mod organ;
 pub mod part;
-pub mod portrait;
 pub mod recognise;
 pub mod skeleton;
 pub mod subtree;

@@ -1,6 +1,6 @@
 //! The command line: one file a command.
 
-mod inspect;
+mod bake;
 
 use std::ffi::OsString;
 use std::process::ExitCode;
@@ -16,7 +16,7 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
-    Inspect(inspect::InspectArgs),
+    Bake(bake::Args),
 }
 
 /// Parses the arguments, runs one command and says how it ended.
@@ -28,10 +28,10 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
             return ExitCode::from(if error.use_stderr() { 2 } else { 0 });
         }
     };
-    let result = match cli.command {
-        Command::Inspect(args) => inspect::run(&args),
+    let done = match cli.command {
+        Command::Bake(args) => bake::run(args),
     };
-    match result {
+    match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {error}");

@@ -1,3 +1,7 @@
 //! STEP 3: billboards become levels of detail.
 
-pub mod wood;
+pub mod element;
+pub mod level;
+pub mod merge;
+pub mod optimal_cut;
+pub mod reassign;

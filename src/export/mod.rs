@@ -1,1 +1,11 @@
 //! STEP 4: levels become a package on disk.
+
+pub mod atlas;
+pub mod chart;
+pub mod edge;
+pub mod foliage;
+pub mod gltf;
+pub mod matching;
+pub mod original;
+pub mod project;
+pub mod refine;

@@ -1,0 +1,191 @@
+//! Bakes the cards of a level: charts, atlas, projected maps, and the mesh that shows them.
+
+use glam::{Vec2, Vec3};
+use rayon::prelude::*;
+
+use super::atlas;
+use super::chart::Chart;
+use super::edge::bleed;
+use super::gltf::Surface;
+use super::project::{Texel, project};
+use crate::botany::model::{AlphaMode, Image, Material, Model, TextureRef, Wrap};
+use crate::cloud::card::Card;
+use crate::space::texture::srgb;
+
+/// A card and the triangles of the model that it shows.
+#[derive(Clone, Debug, Default)]
+pub struct CardGroup {
+    /// The billboard.
+    pub card: Card,
+    /// What is projected on it.
+    pub triangles: Vec<u32>,
+}
+
+/// How cards are baked.
+#[derive(Clone, Copy, Debug)]
+pub struct BakeOptions {
+    /// Texels a normalised unit.
+    pub density: f32,
+    /// Gutter on each side of a chart, texels.
+    pub pad: f32,
+    /// Sub-samples a texel along each axis.
+    pub samples: u32,
+}
+
+/// Baked cards: one atlas page and where each card lies on it.
+#[derive(Clone, Debug, Default)]
+pub struct Foliage {
+    /// One chart for each card.
+    pub charts: Vec<Chart>,
+    /// Size of the page in texels.
+    pub size: [u32; 2],
+    /// The page, row by row; colours and normals are already bled into empty texels.
+    pub texels: Vec<Texel>,
+    /// Whether the texel belongs to a chart.
+    pub owned: Vec<bool>,
+    /// Final alpha of each texel; set from coverage by [`Foliage::threshold`] or by matching.
+    pub alpha: Vec<u8>,
+}
+
+impl Foliage {
+    /// Lays out, packs and projects all cards. Where they don't fit on the largest page, the
+    /// density falls until they do.
+    pub fn bake(model: &Model, groups: &[CardGroup], options: BakeOptions) -> Self {
+        let mut density = options.density;
+        let (mut charts, size) = loop {
+            let mut charts: Vec<Chart> = groups
+                .par_iter()
+                .map(|g| Chart::new(&g.card, density, options.pad))
+                .collect();
+            match atlas::pack(&mut charts) {
+                Some(size) => break (charts, size),
+                None => density *= 0.8,
+            }
+        };
+        let mut texels = vec![Texel::default(); (size[0] * size[1]) as usize];
+        let mut owned = vec![false; texels.len()];
+        let projected: Vec<_> = groups
+            .par_iter()
+            .zip(&mut charts)
+            .map(|(g, chart)| project(model, g.triangles.iter().copied(), chart, options.samples))
+            .collect();
+        for (chart, projection) in charts.iter().zip(projected) {
+            for y in 0..chart.size[1] {
+                for x in 0..chart.size[0] {
+                    if chart.owns(x, y) {
+                        let [ax, ay] = chart.in_atlas(x, y);
+                        let at = (ay * size[0] + ax) as usize;
+                        texels[at] = projection.texels[(y * chart.size[0] + x) as usize];
+                        owned[at] = true;
+                    }
+                }
+            }
+        }
+        let mut foliage = Self {
+            charts,
+            size,
+            texels,
+            owned,
+            alpha: Vec::new(),
+        };
+        foliage.threshold(0.5, 0);
+        foliage
+    }
+
+    /// Alpha 255 where the coverage reaches `t`, else `floor`.
+    pub fn threshold(&mut self, t: f32, floor: u8) {
+        self.alpha = self
+            .texels
+            .iter()
+            .map(|x| if x.coverage >= t { 255 } else { floor })
+            .collect();
+    }
+
+    /// Bleeds colours into empty texels; call once, after the last use of `coverage` as it is.
+    pub fn bleed(&mut self) {
+        let weights: Vec<f32> = self.texels.iter().map(|t| t.coverage).collect();
+        let fields: [fn(&mut Texel) -> &mut Vec3; 3] =
+            [|t| &mut t.color, |t| &mut t.normal, |t| &mut t.orm];
+        for field in fields {
+            let mut values: Vec<Vec3> = self.texels.iter_mut().map(|t| *field(t)).collect();
+            bleed(&mut values, &weights, self.size);
+            for (texel, value) in self.texels.iter_mut().zip(values) {
+                *field(texel) = value;
+            }
+        }
+    }
+
+    /// The cards as a mesh with normals, tangents and atlas coordinates.
+    pub fn surface(&self) -> Surface {
+        let mut out = Surface {
+            name: "foliage".into(),
+            ..Surface::default()
+        };
+        let scale = Vec2::new(1.0 / self.size[0] as f32, 1.0 / self.size[1] as f32);
+        for chart in &self.charts {
+            let base = out.positions.len() as u32;
+            for &corner in &chart.corners {
+                out.positions.push(corner);
+                out.normals.push(chart.normal);
+                let t = chart.tangent;
+                out.tangents.push([t.x, t.y, t.z, 1.0]);
+                out.uvs[0].push(chart.atlas_point(corner) * scale);
+            }
+            for i in 2..chart.corners.len() as u32 {
+                out.triangles.push([base, base + i - 1, base + i]);
+            }
+        }
+        out
+    }
+
+    /// Base colour with alpha, tangent-space normals, and occlusion-roughness-metalness.
+    pub fn images(&self) -> [Image; 3] {
+        let page = |name: &str, pixel: &dyn Fn(&Texel, u8) -> [u8; 4]| Image {
+            name: name.into(),
+            width: self.size[0],
+            height: self.size[1],
+            rgba: self
+                .texels
+                .iter()
+                .zip(&self.alpha)
+                .flat_map(|(t, &a)| pixel(t, a))
+                .collect(),
+        };
+        let byte = |v: f32| (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8;
+        [
+            page("foliage_base_color", &|t, a| {
+                [srgb(t.color.x), srgb(t.color.y), srgb(t.color.z), a]
+            }),
+            page("foliage_normal", &|t, _| {
+                let n = t.normal.normalize_or(Vec3::Z) * 0.5 + 0.5;
+                [byte(n.x), byte(n.y), byte(n.z), 255]
+            }),
+            page("foliage_orm", &|t, _| {
+                [byte(t.orm.x), byte(t.orm.y), byte(t.orm.z), 255]
+            }),
+        ]
+    }
+
+    /// The material of the cards; its images are numbered from `first_image`.
+    pub fn material(&self, first_image: u32) -> Material {
+        let texture = |k: u32| {
+            Some(TextureRef {
+                image: first_image + k,
+                uv_set: 0,
+                wrap: [Wrap::Clamp; 2],
+                linear: true,
+            })
+        };
+        Material {
+            name: "foliage".into(),
+            base_color: texture(0),
+            normal: texture(1),
+            metallic_roughness: texture(2),
+            occlusion: texture(2),
+            alpha_mode: AlphaMode::Mask,
+            alpha_cutoff: 0.5,
+            double_sided: true,
+            ..Material::default()
+        }
+    }
+}

@@ -1,0 +1,393 @@
+//! Writes one level as glTF: stock materials, PNG textures, float attributes.
+//!
+//! Single files carry no required extension, because that is the only form that every client
+//! shows right. The root node holds the similarity from normalised space back to the world.
+
+use std::collections::BTreeMap;
+
+use glam::{Vec2, Vec3};
+use serde_json::{Map, Value, json};
+
+use crate::botany::model::{AlphaMode, Frame, Image, Material, Model, TextureRef, Wrap};
+use crate::error::{Error, Result};
+use crate::space::glb::GlbBuilder;
+
+/// A mesh with one material.
+#[derive(Clone, Debug, Default)]
+pub struct Surface {
+    /// "foliage", "wood", or what the source called it.
+    pub name: String,
+    /// Normalised positions.
+    pub positions: Vec<Vec3>,
+    /// Unit normals.
+    pub normals: Vec<Vec3>,
+    /// Tangents with handedness; empty or one each vertex.
+    pub tangents: Vec<[f32; 4]>,
+    /// Two sets of texture coordinates; each empty or one each vertex.
+    pub uvs: [Vec<Vec2>; 2],
+    /// Linear vertex colours; empty or one each vertex.
+    pub colors: Vec<[f32; 4]>,
+    /// Counter-clockwise triangles.
+    pub triangles: Vec<[u32; 3]>,
+    /// Index into the scene's materials.
+    pub material: u32,
+}
+
+/// All that one file shows.
+#[derive(Clone, Debug, Default)]
+pub struct Scene {
+    /// Meshes; one draw call each.
+    pub surfaces: Vec<Surface>,
+    /// Materials that surfaces refer to.
+    pub materials: Vec<Material>,
+    /// Images that materials refer to.
+    pub images: Vec<Image>,
+}
+
+impl Scene {
+    /// Number of triangles.
+    pub fn triangles(&self) -> u64 {
+        self.surfaces.iter().map(|s| s.triangles.len() as u64).sum()
+    }
+}
+
+/// The chosen triangles of a model as surfaces, one for each material, with only the images used.
+pub fn scene_of_model(model: &Model, triangles: impl Iterator<Item = u32>) -> Scene {
+    let mut by_material: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+    for t in triangles {
+        let object = model.triangle_object[t as usize];
+        by_material
+            .entry(model.objects[object as usize].material)
+            .or_default()
+            .push(t);
+    }
+    let mut scene = Scene::default();
+    let mut images: BTreeMap<u32, u32> = BTreeMap::new();
+    for (material, triangles) in by_material {
+        let mut copy = model.materials[material as usize].clone();
+        for texture in textures_of(&mut copy).into_iter().flatten() {
+            let next = images.len() as u32;
+            texture.image = *images.entry(texture.image).or_insert(next);
+        }
+        let mut surface = gather(model, &triangles);
+        surface.material = scene.materials.len() as u32;
+        surface.name = copy.name.clone();
+        scene.materials.push(copy);
+        scene.surfaces.push(surface);
+    }
+    let mut order: Vec<(u32, u32)> = images.into_iter().map(|(from, to)| (to, from)).collect();
+    order.sort_unstable();
+    scene.images = order
+        .iter()
+        .map(|&(_, from)| model.images[from as usize].clone())
+        .collect();
+    scene
+}
+
+fn textures_of(m: &mut Material) -> [Option<&mut TextureRef>; 5] {
+    [
+        m.base_color.as_mut(),
+        m.metallic_roughness.as_mut(),
+        m.normal.as_mut(),
+        m.occlusion.as_mut(),
+        m.emissive.as_mut(),
+    ]
+}
+
+fn gather(model: &Model, triangles: &[u32]) -> Surface {
+    let mut index = vec![u32::MAX; model.positions.len()];
+    let mut out = Surface::default();
+    for &t in triangles {
+        let corners = model.triangles[t as usize].map(|i| {
+            let at = i as usize;
+            if index[at] == u32::MAX {
+                index[at] = out.positions.len() as u32;
+                out.positions.push(model.positions[at]);
+                out.normals.push(model.normals[at]);
+                for set in 0..2 {
+                    if let Some(&uv) = model.uvs[set].get(at) {
+                        out.uvs[set].push(uv);
+                    }
+                }
+                if let Some(&color) = model.colors.get(at) {
+                    out.colors.push(color);
+                }
+            }
+            index[at]
+        });
+        out.triangles.push(corners);
+    }
+    out
+}
+
+/// Writes `scene` as a GLB named `name`; `extras` go on the root node.
+pub fn write_glb(name: &str, scene: &Scene, frame: &Frame, extras: Value) -> Result<Vec<u8>> {
+    let mut file = FileBuilder::default();
+    let mesh = file.mesh(name, scene)?;
+    let node = file.node(name, mesh, frame, extras);
+    Ok(file.finish(vec![node]))
+}
+
+/// Collects what goes into one file; several levels may share it.
+#[derive(Default)]
+pub struct FileBuilder {
+    glb: GlbBuilder,
+    meshes: Vec<Value>,
+    /// Nodes in order; `MSFT_lod` is wired by the caller through [`Self::node_mut`].
+    nodes: Vec<Value>,
+    materials: Vec<Value>,
+    textures: Vec<Value>,
+    images: Vec<Value>,
+    samplers: Vec<Value>,
+    unlit: bool,
+    used: Vec<&'static str>,
+}
+
+impl FileBuilder {
+    /// Adds all surfaces of a scene as one mesh and returns its index.
+    pub fn mesh(&mut self, name: &str, scene: &Scene) -> Result<usize> {
+        let image_base = self.images.len();
+        for image in &scene.images {
+            let bytes = encode_png(image)?;
+            let view = self.glb.view(&bytes, None);
+            let mut entry = json!({ "bufferView": view, "mimeType": "image/png" });
+            if !image.name.is_empty() {
+                entry["name"] = json!(image.name);
+            }
+            self.images.push(entry);
+        }
+        let material_base = self.materials.len();
+        for material in &scene.materials {
+            let value = self.material(material, image_base);
+            self.materials.push(value);
+        }
+        let mut primitives = Vec::new();
+        for surface in scene.surfaces.iter().filter(|s| !s.triangles.is_empty()) {
+            let uses = uv_sets(&scene.materials[surface.material as usize]);
+            let mut attributes = Map::new();
+            attributes.insert(
+                "POSITION".into(),
+                json!(self.glb.positions(&surface.positions)),
+            );
+            attributes.insert("NORMAL".into(), json!(self.glb.vec3(&surface.normals)));
+            if !surface.tangents.is_empty() {
+                attributes.insert("TANGENT".into(), json!(self.glb.vec4(&surface.tangents)));
+            }
+            if uses[0] || uses[1] {
+                attributes.insert("TEXCOORD_0".into(), json!(self.glb.vec2(&surface.uvs[0])));
+            }
+            if uses[1] && !surface.uvs[1].is_empty() {
+                attributes.insert("TEXCOORD_1".into(), json!(self.glb.vec2(&surface.uvs[1])));
+            }
+            if !surface.colors.is_empty() {
+                attributes.insert("COLOR_0".into(), json!(self.glb.vec4(&surface.colors)));
+            }
+            let indices = self
+                .glb
+                .indices(&surface.triangles, surface.positions.len());
+            primitives.push(json!({
+                "attributes": attributes,
+                "indices": indices,
+                "material": material_base + surface.material as usize,
+            }));
+        }
+        if primitives.is_empty() {
+            return Err(Error::Internal {
+                step: "write glTF",
+                what: format!("level {name} has no triangle"),
+            });
+        }
+        self.meshes
+            .push(json!({ "name": name, "primitives": primitives }));
+        Ok(self.meshes.len() - 1)
+    }
+
+    /// Adds a node that places a mesh in the world and returns its index.
+    pub fn node(&mut self, name: &str, mesh: usize, frame: &Frame, extras: Value) -> usize {
+        let c = frame.center.to_array().map(|v| v as f32);
+        let r = frame.radius as f32;
+        let mut node = json!({ "name": name, "mesh": mesh });
+        if c != [0.0; 3] {
+            node["translation"] = json!(c);
+        }
+        if r != 1.0 {
+            node["scale"] = json!([r, r, r]);
+        }
+        if !extras.is_null() {
+            node["extras"] = extras;
+        }
+        self.nodes.push(node);
+        self.nodes.len() - 1
+    }
+
+    /// The JSON of a node, for extensions.
+    pub fn node_mut(&mut self, node: usize) -> &mut Value {
+        &mut self.nodes[node]
+    }
+
+    /// Names an extension in `extensionsUsed`.
+    pub fn use_extension(&mut self, name: &'static str) {
+        if !self.used.contains(&name) {
+            self.used.push(name);
+        }
+    }
+
+    /// The file with a scene of the given nodes.
+    pub fn finish(mut self, scene_nodes: Vec<usize>) -> Vec<u8> {
+        if self.unlit {
+            self.use_extension("KHR_materials_unlit");
+        }
+        let generator = concat!("pleach ", env!("CARGO_PKG_VERSION"));
+        let mut root = json!({
+            "asset": { "version": "2.0", "generator": generator },
+            "scene": 0,
+            "scenes": [{ "nodes": scene_nodes }],
+            "nodes": self.nodes,
+            "meshes": self.meshes,
+            "materials": self.materials,
+        });
+        for (key, list) in [
+            ("textures", self.textures),
+            ("images", self.images),
+            ("samplers", self.samplers),
+        ] {
+            if !list.is_empty() {
+                root[key] = Value::Array(list);
+            }
+        }
+        if !self.used.is_empty() {
+            root["extensionsUsed"] = json!(self.used);
+        }
+        self.glb.finish(root)
+    }
+
+    fn texture(&mut self, texture: TextureRef, image_base: usize) -> Value {
+        let wrap = texture.wrap.map(|w| match w {
+            Wrap::Repeat => 10497,
+            Wrap::Mirror => 33648,
+            Wrap::Clamp => 33071,
+        });
+        let mag = if texture.linear { 9729 } else { 9728 };
+        let sampler =
+            json!({ "magFilter": mag, "minFilter": 9987, "wrapS": wrap[0], "wrapT": wrap[1] });
+        let sampler = find_or_push(&mut self.samplers, sampler);
+        let entry = json!({ "sampler": sampler, "source": image_base + texture.image as usize });
+        let mut info = json!({ "index": find_or_push(&mut self.textures, entry) });
+        if texture.uv_set > 0 {
+            info["texCoord"] = json!(texture.uv_set);
+        }
+        info
+    }
+
+    fn material(&mut self, m: &Material, image_base: usize) -> Value {
+        let mut pbr = json!({});
+        if m.base_color_factor != [1.0; 4] {
+            pbr["baseColorFactor"] = json!(m.base_color_factor);
+        }
+        if m.metallic_factor != 1.0 {
+            pbr["metallicFactor"] = json!(m.metallic_factor);
+        }
+        if m.roughness_factor != 1.0 {
+            pbr["roughnessFactor"] = json!(m.roughness_factor);
+        }
+        if let Some(t) = m.base_color {
+            pbr["baseColorTexture"] = self.texture(t, image_base);
+        }
+        if let Some(t) = m.metallic_roughness {
+            pbr["metallicRoughnessTexture"] = self.texture(t, image_base);
+        }
+        let mut out = json!({});
+        if !m.name.is_empty() {
+            out["name"] = json!(m.name);
+        }
+        out["pbrMetallicRoughness"] = pbr;
+        if let Some(t) = m.normal {
+            let mut info = self.texture(t, image_base);
+            if m.normal_scale != 1.0 {
+                info["scale"] = json!(m.normal_scale);
+            }
+            out["normalTexture"] = info;
+        }
+        if let Some(t) = m.occlusion {
+            let mut info = self.texture(t, image_base);
+            if m.occlusion_strength != 1.0 {
+                info["strength"] = json!(m.occlusion_strength);
+            }
+            out["occlusionTexture"] = info;
+        }
+        if let Some(t) = m.emissive {
+            out["emissiveTexture"] = self.texture(t, image_base);
+        }
+        if m.emissive_factor != [0.0; 3] {
+            out["emissiveFactor"] = json!(m.emissive_factor);
+        }
+        match m.alpha_mode {
+            AlphaMode::Opaque => {}
+            AlphaMode::Mask => {
+                out["alphaMode"] = json!("MASK");
+                if m.alpha_cutoff != 0.5 {
+                    out["alphaCutoff"] = json!(m.alpha_cutoff);
+                }
+            }
+            AlphaMode::Blend => out["alphaMode"] = json!("BLEND"),
+        }
+        if m.double_sided {
+            out["doubleSided"] = json!(true);
+        }
+        if m.unlit {
+            self.unlit = true;
+            out["extensions"] = json!({ "KHR_materials_unlit": {} });
+        }
+        out
+    }
+}
+
+fn uv_sets(m: &Material) -> [bool; 2] {
+    let mut copy = m.clone();
+    let mut uses = [false; 2];
+    for texture in textures_of(&mut copy).into_iter().flatten() {
+        uses[usize::from(texture.uv_set)] = true;
+    }
+    uses
+}
+
+fn find_or_push(list: &mut Vec<Value>, value: Value) -> usize {
+    match list.iter().position(|v| *v == value) {
+        Some(index) => index,
+        None => {
+            list.push(value);
+            list.len() - 1
+        }
+    }
+}
+
+/// PNG without an alpha channel where every texel is opaque.
+pub fn encode_png(image: &Image) -> Result<Vec<u8>> {
+    let fail = |error: png::EncodingError| Error::Internal {
+        step: "encode PNG",
+        what: error.to_string(),
+    };
+    let opaque = image.rgba.chunks_exact(4).all(|t| t[3] == 255);
+    let mut out = Vec::new();
+    let mut encoder = png::Encoder::new(&mut out, image.width, image.height);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_color(if opaque {
+        png::ColorType::Rgb
+    } else {
+        png::ColorType::Rgba
+    });
+    encoder.set_compression(png::Compression::Balanced);
+    let mut writer = encoder.write_header().map_err(fail)?;
+    if opaque {
+        let rgb: Vec<u8> = image
+            .rgba
+            .chunks_exact(4)
+            .flat_map(|t| [t[0], t[1], t[2]])
+            .collect();
+        writer.write_image_data(&rgb).map_err(fail)?;
+    } else {
+        writer.write_image_data(&image.rgba).map_err(fail)?;
+    }
+    writer.finish().map_err(fail)?;
+    Ok(out)
+}

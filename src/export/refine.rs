@@ -1,0 +1,165 @@
+//! Fits the cards' texels to the original's silhouettes.
+//!
+//! A leaf that moved to its card's plane lands beside its true place in most views. What matters
+//! is the outline of the whole, so every texel is asked, over many training views, whether the
+//! original covers the cells that it would cover, given what the other cards cover there already:
+//!
+//! * the original covers the cell and nothing else does: the texel should be opaque (+1);
+//! * the original leaves it free: transparent, the more the fewer others spoil it (-1/others);
+//! * covered either way: no vote.
+//!
+//! The mean vote is added to the projected coverage and thresholded; a few rounds let cards
+//! agree. Views are orthographic, so a card's texels map to cells by one affine map a view.
+
+use glam::{Vec2, Vec3};
+use rayon::prelude::*;
+
+use super::chart::Chart;
+use super::foliage::Foliage;
+
+/// The original from one direction, on a grid of cells.
+#[derive(Clone, Debug)]
+pub struct Target {
+    /// Cells for one unit to the right.
+    pub right: Vec3,
+    /// Cells for one unit down.
+    pub down: Vec3,
+    /// Cell coordinates of the origin.
+    pub base: Vec2,
+    /// Width and height in cells.
+    pub size: [u32; 2],
+    /// Whether the original covers the cell.
+    pub wanted: Vec<bool>,
+    /// Whether geometry that is not on cards (tubes) covers the cell already.
+    pub taken: Vec<bool>,
+}
+
+/// Settings of the fit.
+#[derive(Clone, Copy, Debug)]
+pub struct Refine {
+    /// Rounds of votes.
+    pub rounds: u32,
+    /// What a unanimous vote adds to the projected coverage.
+    pub weight: f32,
+}
+
+/// For each texel of the page, the projected coverage corrected by the views' votes.
+pub fn refine(foliage: &Foliage, targets: &[Target], options: Refine) -> Vec<f32> {
+    let mut score: Vec<f32> = foliage.texels.iter().map(|t| t.coverage).collect();
+    let mut mean = vec![0.0f32; score.len()];
+    for round in 0..options.rounds {
+        let on: Vec<bool> = score.iter().map(|&s| s >= 0.5).collect();
+        let counts: Vec<Vec<u8>> = targets
+            .par_iter()
+            .map(|target| count(foliage, target, &on))
+            .collect();
+        let votes: Vec<Vec<f32>> = foliage
+            .charts
+            .par_iter()
+            .map(|chart| vote(chart, foliage.size[0], targets, &counts, &on))
+            .collect();
+        // Later rounds move less, so that two cards do not swap a cell for ever.
+        let step = 1.0 / (round as f32 + 1.0).sqrt();
+        for (chart, votes) in foliage.charts.iter().zip(votes) {
+            for y in 0..chart.size[1] {
+                for x in 0..chart.size[0] {
+                    if !chart.owns(x, y) {
+                        continue;
+                    }
+                    let [ax, ay] = chart.in_atlas(x, y);
+                    let at = (ay * foliage.size[0] + ax) as usize;
+                    mean[at] += step * (votes[(y * chart.size[0] + x) as usize] - mean[at]);
+                    score[at] = foliage.texels[at].coverage + options.weight * mean[at];
+                }
+            }
+        }
+    }
+    score
+}
+
+/// How many opaque texels each cell sees, at most 255.
+fn count(foliage: &Foliage, target: &Target, on: &[bool]) -> Vec<u8> {
+    let mut counts = vec![0u8; target.wanted.len()];
+    for chart in &foliage.charts {
+        scan(chart, target, |cell, x, y| {
+            let [ax, ay] = chart.in_atlas(x, y);
+            if on[(ay * foliage.size[0] + ax) as usize] {
+                counts[cell] = counts[cell].saturating_add(1);
+            }
+        });
+    }
+    counts
+}
+
+fn vote(
+    chart: &Chart,
+    width: u32,
+    targets: &[Target],
+    counts: &[Vec<u8>],
+    on: &[bool],
+) -> Vec<f32> {
+    let texels = (chart.size[0] * chart.size[1]) as usize;
+    let (mut sum, mut hits) = (vec![0.0f32; texels], vec![0u32; texels]);
+    for (target, counts) in targets.iter().zip(counts) {
+        scan(chart, target, |cell, x, y| {
+            let [ax, ay] = chart.in_atlas(x, y);
+            let own = u8::from(on[(ay * width + ax) as usize]);
+            let others = counts[cell].saturating_sub(own);
+            let at = (y * chart.size[0] + x) as usize;
+            hits[at] += 1;
+            sum[at] += match (target.wanted[cell], target.taken[cell]) {
+                (_, true) => 0.0,
+                (true, false) if others == 0 => 1.0,
+                (true, false) => 0.0,
+                (false, false) => -1.0 / (f32::from(others) + 1.0),
+            };
+        });
+    }
+    for (sum, &hits) in sum.iter_mut().zip(&hits) {
+        *sum /= hits.max(1) as f32;
+    }
+    sum
+}
+
+/// Visits every cell whose centre the card covers, with the texel that lies there.
+fn scan(chart: &Chart, target: &Target, mut visit: impl FnMut(usize, u32, u32)) {
+    let cell = |p: Vec3| target.base + Vec2::new(p.dot(target.right), p.dot(target.down));
+    let corner: Vec<Vec2> = chart.corners.iter().map(|&p| cell(p)).collect();
+    let texel: Vec<Vec2> = chart.corners[..3].iter().map(|&p| chart.texel(p)).collect();
+    let (a, b) = (corner[1] - corner[0], corner[2] - corner[0]);
+    let area = a.perp_dot(b);
+    // Seen edge-on the card covers nothing that a cell could vote on.
+    if area.abs() < 0.05 {
+        return;
+    }
+    let (ta, tb) = (texel[1] - texel[0], texel[2] - texel[0]);
+    let per_x = (ta * b.y - tb * a.y) / area;
+    let per_y = (tb * a.x - ta * b.x) / area;
+    let low = corner.iter().fold(Vec2::MAX, |m, &c| m.min(c)).y;
+    let high = corner.iter().fold(Vec2::MIN, |m, &c| m.max(c)).y;
+    let first = (low - 0.5).ceil().max(0.0) as u32;
+    let last = ((high - 0.5).floor() + 1.0).clamp(0.0, target.size[1] as f32) as u32;
+    for y in first..last {
+        let middle = y as f32 + 0.5;
+        let (mut from, mut to) = (f32::MAX, f32::MIN);
+        for i in 0..corner.len() {
+            let (p, q) = (corner[i], corner[(i + 1) % corner.len()]);
+            if (p.y <= middle) != (q.y <= middle) {
+                let x = p.x + (middle - p.y) / (q.y - p.y) * (q.x - p.x);
+                (from, to) = (from.min(x), to.max(x));
+            }
+        }
+        let x_first = (from - 0.5).ceil().max(0.0) as u32;
+        let x_last = ((to - 0.5).floor() + 1.0).clamp(0.0, target.size[0] as f32) as u32;
+        let mut at = texel[0]
+            + per_x * (x_first as f32 + 0.5 - corner[0].x)
+            + per_y * (middle - corner[0].y);
+        for x in x_first..x_last {
+            let (tx, ty) = (at.x.max(0.0) as u32, at.y.max(0.0) as u32);
+            if tx < chart.size[0] && ty < chart.size[1] && chart.owns(tx, ty) {
+                visit((y * target.size[0] + x) as usize, tx, ty);
+            }
+            at += per_x;
+        }
+    }
+}
