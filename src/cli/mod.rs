@@ -1,6 +1,8 @@
 //! The command line: one file a command.
 
 mod bake;
+mod evaluate;
+mod inspect;
 
 use std::ffi::OsString;
 use std::process::ExitCode;
@@ -17,6 +19,8 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     Bake(bake::Args),
+    Evaluate(evaluate::Args),
+    Inspect(inspect::InspectArgs),
 }
 
 /// Parses the arguments, runs one command and says how it ended.
@@ -30,6 +34,9 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
     };
     let done = match cli.command {
         Command::Bake(args) => bake::run(args),
+    let result = match cli.command {
+        Command::Evaluate(args) => evaluate::run(&args),
+        Command::Inspect(args) => inspect::run(&args),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

@@ -1,0 +1,200 @@
+//! `pleach evaluate`: figures and pictures of levels against their original, from the files.
+
+use std::path::{Path, PathBuf};
+
+use crate::botany::Model;
+use crate::botany::load::load;
+use crate::error::{Error, Result};
+use crate::report::schema::{Level, Report, SizeFigures};
+use crate::report::{Settings, contact_sheet, evaluate};
+use crate::space::raster::Sampling;
+use crate::space::view::View;
+
+/// Measures levels of detail against their original; takes any glTF, also another tool's.
+#[derive(clap::Args, Debug)]
+pub struct Args {
+    /// The original tree (.glb or .gltf).
+    original: PathBuf,
+    /// The levels, nearest first.
+    #[arg(required = true)]
+    levels: Vec<PathBuf>,
+    /// Folder for report.json and contact.png.
+    #[arg(short, long)]
+    output: Option<PathBuf>,
+    /// Heights of the tree on the screen, pixels.
+    #[arg(long, value_delimiter = ',', default_value = "256,64", value_parser = clap::value_parser!(u32).range(4..=4096))]
+    height: Vec<u32>,
+    /// Views at least: azimuths at elevations -15, 0 and 30 degrees, and the top.
+    #[arg(long, default_value_t = crate::space::view::DEFAULT_VIEWS, value_parser = parse_views)]
+    views: usize,
+    /// Azimuth of the first view, degrees; another offset gives another set of views.
+    #[arg(long, default_value_t = 0.0, allow_hyphen_values = true)]
+    azimuth_offset: f32,
+    /// Draw the levels also as an engine does: one sample a pixel, box mips, alpha test.
+    #[arg(long)]
+    client: bool,
+    /// Print the report as JSON instead of a table.
+    #[arg(long)]
+    json: bool,
+}
+
+fn parse_views(text: &str) -> std::result::Result<usize, String> {
+    match text.parse() {
+        Ok(count @ 1..=1000) => Ok(count),
+        _ => Err("give a number of views from 1 to 1000".into()),
+    }
+}
+
+/// Runs the command.
+pub fn run(args: &Args) -> Result<()> {
+    let original = load(&args.original)?;
+    let levels: Vec<Model> = args
+        .levels
+        .iter()
+        .map(|file| load(file))
+        .collect::<Result<_>>()?;
+    let settings = Settings {
+        heights_px: args.height.clone(),
+        views: args.views,
+        azimuth_offset_deg: args.azimuth_offset,
+        client: args.client,
+    };
+    let names: Vec<String> = args.levels.iter().map(|file| file_name(file)).collect();
+    let named: Vec<(&Model, &str)> = levels
+        .iter()
+        .zip(&names)
+        .map(|(m, n)| (m, n.as_str()))
+        .collect();
+    let report = evaluate((&original, &file_name(&args.original)), &named, &settings);
+    if let Some(folder) = &args.output {
+        write(folder, &report, &original, &levels, &settings)?;
+    }
+    if args.json {
+        println!("{}", to_json(&report)?);
+    } else {
+        print!("{}", table(&report));
+    }
+    Ok(())
+}
+
+fn file_name(file: &Path) -> String {
+    file.file_name()
+        .unwrap_or(file.as_os_str())
+        .to_string_lossy()
+        .into_owned()
+}
+
+fn to_json(report: &Report) -> Result<String> {
+    serde_json::to_string_pretty(report).map_err(|error| Error::Internal {
+        step: "report",
+        what: error.to_string(),
+    })
+}
+
+fn write(
+    folder: &Path,
+    report: &Report,
+    original: &Model,
+    levels: &[Model],
+    settings: &Settings,
+) -> Result<()> {
+    std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, "create", e))?;
+    let file = folder.join("report.json");
+    std::fs::write(&file, to_json(report)? + "\n").map_err(|e| Error::io(&file, "write", e))?;
+    let height_px = settings.heights_px.first().copied().unwrap_or(256);
+    let shown = views_to_show(report, settings);
+    let models: Vec<&Model> = levels.iter().collect();
+    for (name, sampling) in [
+        ("contact.png", Some(Sampling::REFERENCE)),
+        (
+            "contact-client.png",
+            settings.client.then_some(Sampling::CLIENT),
+        ),
+    ] {
+        let Some(sampling) = sampling else { continue };
+        let (width, height, rgba) = contact_sheet(original, &models, &shown, height_px, sampling);
+        let file = folder.join(name);
+        image::save_buffer(&file, &rgba, width, height, image::ColorType::Rgba8)
+            .map_err(|e| Error::io(&file, "write", std::io::Error::other(e)))?;
+    }
+    Ok(())
+}
+
+/// The first view, one from above, the last level's worst one, and the top.
+fn views_to_show(report: &Report, settings: &Settings) -> Vec<View> {
+    let worst = report
+        .levels
+        .last()
+        .and_then(|level| level.sizes.first())
+        .map(|size| size.f1.worst_view.as_str());
+    let all = settings.view_set();
+    let above = all.iter().position(|v| v.elevation_deg == 30.0);
+    let keep = |(i, view): &(usize, View)| {
+        *i == 0 || Some(*i) == above || Some(view.name.as_str()) == worst || view.name == "top"
+    };
+    all.into_iter()
+        .enumerate()
+        .filter(keep)
+        .map(|(_, view)| view)
+        .collect()
+}
+
+/// The report for people: one line a level and size.
+fn table(report: &Report) -> String {
+    let mut out = format!(
+        "{:<28}{:>10}{:>6}{:>10}{:>6}  {:<8}{:>6}{:>14}{:>7}{:>7}{:>7}{:>14}  worst view\n",
+        "file",
+        "triangles",
+        "draws",
+        "textures",
+        "over",
+        "drawn",
+        "px",
+        "F1 mean worst",
+        "E",
+        "prec",
+        "recall",
+        "area mean worst"
+    );
+    for level in report.original.iter().chain(&report.levels) {
+        let mut head = format!(
+            "{:<28}{:>10}{:>6}{:>10}{:>6.1}",
+            level.file,
+            level.triangles,
+            level.draw_calls,
+            bytes(level.texture_bytes),
+            level.overdraw
+        );
+        for (how, figures) in lines(level) {
+            out += &format!(
+                "{head:<60}  {how:<8}{:>6}{:>8.3}{:>6.3}{:>7.2}{:>7.3}{:>7.3}{:>8.3}{:>6.2}  {}\n",
+                figures.height_px,
+                figures.f1.mean,
+                figures.f1.worst,
+                figures.shift_ratio,
+                figures.precision.mean,
+                figures.recall.mean,
+                figures.area_ratio.mean,
+                figures.area_ratio.worst,
+                figures.f1.worst_view
+            );
+            head.clear();
+        }
+    }
+    out + "\nE: error over that of the original moved by half a pixel; 1 is as near as that. Reference: 4 x 4 samples a pixel.\n"
+}
+
+fn lines(level: &Level) -> impl Iterator<Item = (&'static str, &SizeFigures)> {
+    level.sizes.iter().flat_map(|size| {
+        let client = size.client.as_deref().map(|client| ("client", client));
+        [("4x4", size)].into_iter().chain(client)
+    })
+}
+
+fn bytes(count: u64) -> String {
+    match count {
+        0..1024 => format!("{count} B"),
+        1024..1_048_576 => format!("{:.0} KiB", count as f64 / 1024.0),
+        _ => format!("{:.1} MiB", count as f64 / 1_048_576.0),
+    }
+}
