@@ -6,6 +6,7 @@ pub mod load;
 pub mod model;
 pub mod organ;
 pub mod part;
+pub mod portrait;
 pub mod recognise;
 pub mod skeleton;
 pub mod subtree;

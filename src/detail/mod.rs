@@ -5,3 +5,4 @@ pub mod level;
 pub mod merge;
 pub mod optimal_cut;
 pub mod reassign;
+pub mod wood;

@@ -6,6 +6,7 @@ pub mod glb;
 pub mod grid;
 pub mod hull;
 mod min_triangle;
+pub mod polyline;
 pub mod raster;
 pub mod texture;
 pub mod view;
