@@ -17,6 +17,7 @@ pub mod cloud;
 pub mod detail;
 pub mod error;
 pub mod export;
+pub mod level;
 pub mod pipeline;
 pub mod recipe;
 pub mod report;
