@@ -77,7 +77,11 @@ pub(super) fn read_file(path: &Path, limits: &Limits) -> Result<Vec<u8>> {
 }
 
 /// Splits a file into its JSON and its binary chunk.
-pub(super) fn open<'a>(bytes: &'a [u8], path: &Path) -> Result<(Document, Option<&'a [u8]>)> {
+pub(super) fn open<'a>(
+    bytes: &'a [u8],
+    path: &Path,
+    limits: &Limits,
+) -> Result<(Document, Option<&'a [u8]>)> {
     let (text, chunk) = if bytes.starts_with(MAGIC) {
         split_glb(bytes, path)?
     } else {
@@ -93,6 +97,10 @@ pub(super) fn open<'a>(bytes: &'a [u8], path: &Path) -> Result<(Document, Option
         }
         (text, None)
     };
+    // Some exporters pad the chunk with zeros instead of spaces.
+    let zeros = text.iter().rev().take_while(|&&b| b == 0).count();
+    let text = &text[..text.len() - zeros];
+    check_size(text, path, limits)?;
     let document: Document = serde_json::from_slice(text)
         .map_err(|e| fault(path, "JSON", e.to_string(), HELP_EXPORT))?;
     if !document.asset.version.starts_with("2.") {
@@ -105,6 +113,20 @@ pub(super) fn open<'a>(bytes: &'a [u8], path: &Path) -> Result<(Document, Option
         ));
     }
     Ok((document, chunk))
+}
+
+/// JSON of many tiny objects takes far more memory than its text, so both are bounded.
+fn check_size(text: &[u8], path: &Path, limits: &Limits) -> Result<()> {
+    let objects = text.iter().filter(|&&b| b == b'{').count();
+    if text.len() as u64 <= limits.bytes / 8 && objects / 4 <= limits.nodes {
+        return Ok(());
+    }
+    Err(fault(
+        path,
+        "JSON",
+        format!("{} bytes with {objects} objects are too many", text.len()),
+        "join objects before the export, and export as .glb",
+    ))
 }
 
 fn split_glb<'a>(bytes: &'a [u8], path: &Path) -> Result<(&'a [u8], Option<&'a [u8]>)> {

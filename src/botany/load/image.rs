@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 use std::io::Cursor;
+use std::path::Path;
 
 use ::image::{ImageFormat, ImageReader};
 use rayon::prelude::*;
@@ -85,13 +86,14 @@ pub(super) fn decode_all(
             return Err(asset.fault(place, what, "scale the textures down"));
         }
         pixels_left -= pixels;
-        jobs.push((index, place, bytes, format));
+        jobs.push((index, place, bytes, format, pixels));
     }
     // 2. Texels, on all threads; the collected order is that of the list.
     jobs.par_iter()
-        .map(|(index, place, bytes, format)| {
-            let mut image = decode(bytes, *format).map_err(|what| broken(asset, place, what))?;
-            image.name = asset.json.images[*index].name.clone().unwrap_or_default();
+        .map(|(index, place, bytes, format, pixels)| {
+            let mut image =
+                decode(bytes, *format, *pixels).map_err(|what| broken(asset, place, what))?;
+            image.name = name(asset, *index);
             Ok(image)
         })
         .collect()
@@ -110,6 +112,19 @@ fn place(asset: &Asset, index: usize) -> String {
         Some(name) => format!("image {index} ({name})"),
         None => format!("image {index}"),
     }
+}
+
+/// The name in the file, or that of the image file.
+fn name(asset: &Asset, index: usize) -> String {
+    let image = &asset.json.images[index];
+    let file = image.uri.as_deref().filter(|uri| !uri.starts_with("data:"));
+    let file = file.and_then(|uri| Path::new(uri).file_stem()?.to_str());
+    image
+        .name
+        .as_deref()
+        .or(file)
+        .unwrap_or_default()
+        .to_owned()
 }
 
 fn encoded<'a>(asset: &'a Asset, index: usize, place: &str) -> Result<(Cow<'a, [u8]>, u64)> {
@@ -178,13 +193,14 @@ fn web_decoder(
     image_webp::WebPDecoder::new(Cursor::new(bytes)).map_err(said)
 }
 
-fn decode(bytes: &[u8], format: Format) -> std::result::Result<Image, String> {
+fn decode(bytes: &[u8], format: Format, pixels: u64) -> std::result::Result<Image, String> {
     if let Format::WebP = format {
-        return decode_webp(bytes);
+        return decode_webp(bytes, pixels);
     }
     let mut reader = reader(bytes, format);
-    // The texels were counted already; the crate's own limit (512 MiB) would refuse 16-bit images.
-    reader.no_limits();
+    let mut limits = ::image::Limits::default();
+    limits.max_alloc = Some(working_memory(pixels));
+    reader.limits(limits);
     let rgba = reader.decode().map_err(said)?.into_rgba8();
     Ok(Image {
         name: String::new(),
@@ -194,8 +210,15 @@ fn decode(bytes: &[u8], format: Format) -> std::result::Result<Image, String> {
     })
 }
 
-fn decode_webp(bytes: &[u8]) -> std::result::Result<Image, String> {
+/// Bytes that decoding may take: 16-bit RGBA twice, and room for tables and profiles. Hidden
+/// chunks that inflate to more are refused.
+fn working_memory(pixels: u64) -> u64 {
+    pixels * 16 + (64 << 20)
+}
+
+fn decode_webp(bytes: &[u8], pixels: u64) -> std::result::Result<Image, String> {
     let mut decoder = web_decoder(bytes)?;
+    decoder.set_memory_limit(working_memory(pixels) as usize);
     let (width, height) = decoder.dimensions();
     let size = decoder.output_buffer_size().ok_or("its size overflows")?;
     let mut texels = vec![0; size];

@@ -6,7 +6,7 @@
 use std::collections::BTreeMap;
 
 use serde::Deserialize;
-use serde_json::Value;
+use serde::de::IgnoredAny;
 
 #[derive(Deserialize, Default)]
 #[serde(rename_all = "camelCase", default)]
@@ -87,8 +87,15 @@ pub(super) struct Primitive {
     pub indices: Option<usize>,
     pub material: Option<usize>,
     pub mode: Option<u32>,
-    pub targets: Option<Vec<Value>>,
-    pub extensions: Option<BTreeMap<String, Value>>,
+    pub targets: Vec<IgnoredAny>,
+    pub extensions: PrimitiveExtensions,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(default)]
+pub(super) struct PrimitiveExtensions {
+    #[serde(rename = "KHR_draco_mesh_compression")]
+    pub draco: Option<IgnoredAny>,
 }
 
 #[derive(Deserialize, Default)]
@@ -181,9 +188,9 @@ pub(super) struct Buffer {
 pub(super) struct Material {
     pub name: Option<String>,
     pub pbr_metallic_roughness: Pbr,
-    pub normal_texture: Option<TextureInfo>,
-    pub occlusion_texture: Option<TextureInfo>,
-    pub emissive_texture: Option<TextureInfo>,
+    pub normal_texture: Option<Box<TextureInfo>>,
+    pub occlusion_texture: Option<Box<TextureInfo>>,
+    pub emissive_texture: Option<Box<TextureInfo>>,
     pub emissive_factor: Option<[f32; 3]>,
     pub alpha_mode: Option<String>,
     pub alpha_cutoff: Option<f32>,
@@ -195,26 +202,26 @@ pub(super) struct Material {
 #[serde(rename_all = "camelCase", default)]
 pub(super) struct Pbr {
     pub base_color_factor: Option<[f32; 4]>,
-    pub base_color_texture: Option<TextureInfo>,
+    pub base_color_texture: Option<Box<TextureInfo>>,
     pub metallic_factor: Option<f32>,
     pub roughness_factor: Option<f32>,
-    pub metallic_roughness_texture: Option<TextureInfo>,
+    pub metallic_roughness_texture: Option<Box<TextureInfo>>,
 }
 
 #[derive(Deserialize, Default)]
 #[serde(default)]
 pub(super) struct MaterialExtensions {
     #[serde(rename = "KHR_materials_unlit")]
-    pub unlit: Option<Value>,
+    pub unlit: Option<IgnoredAny>,
     #[serde(rename = "KHR_materials_pbrSpecularGlossiness")]
-    pub specular_glossiness: Option<SpecularGlossiness>,
+    pub specular_glossiness: Option<Box<SpecularGlossiness>>,
 }
 
 #[derive(Deserialize, Default)]
 #[serde(rename_all = "camelCase", default)]
 pub(super) struct SpecularGlossiness {
     pub diffuse_factor: Option<[f32; 4]>,
-    pub diffuse_texture: Option<TextureInfo>,
+    pub diffuse_texture: Option<Box<TextureInfo>>,
     pub glossiness_factor: Option<f32>,
 }
 
@@ -236,7 +243,7 @@ pub(super) struct TextureInfo {
 #[serde(default)]
 pub(super) struct TextureInfoExtensions {
     #[serde(rename = "KHR_texture_transform")]
-    pub transform: Option<TextureTransform>,
+    pub transform: Option<Box<TextureTransform>>,
 }
 
 #[derive(Deserialize, Default)]

@@ -77,29 +77,7 @@ impl Materials {
     /// Reads the materials of all primitives that are placed.
     pub fn new(asset: &Asset, placements: &[Placement], warnings: &mut Warnings) -> Result<Self> {
         let json = asset.json;
-        let mut used = vec![false; json.materials.len() + 1];
-        let mut mesh_done = vec![false; json.meshes.len()];
-        for placement in placements {
-            if std::mem::replace(&mut mesh_done[placement.mesh], true) {
-                continue;
-            }
-            for (p, primitive) in json.meshes[placement.mesh].primitives.iter().enumerate() {
-                let index = primitive.material.unwrap_or(json.materials.len());
-                if index > json.materials.len() || primitive.material == Some(json.materials.len())
-                {
-                    let place = format!("mesh {}, primitive {p}", placement.mesh);
-                    return Err(asset.fault(
-                        place,
-                        format!("there is no material {index}"),
-                        BROKEN,
-                    ));
-                }
-                used[index] = true;
-            }
-        }
-        if !used.contains(&true) {
-            used[json.materials.len()] = true;
-        }
+        let used = used(asset, placements)?;
         let mut out = Self {
             list: Vec::new(),
             images: Vec::new(),
@@ -107,6 +85,7 @@ impl Materials {
             renumbered: vec![0; used.len()],
         };
         let default = json::Material::default();
+        let mut image_slots = vec![u32::MAX; json.images.len()];
         for (i, _) in used.iter().enumerate().filter(|(_, used)| **used) {
             out.renumbered[i] = out.list.len() as u32;
             let source = json.materials.get(i).unwrap_or(&default);
@@ -114,6 +93,7 @@ impl Materials {
                 asset,
                 warnings,
                 images: &mut out.images,
+                image_slots: &mut image_slots,
                 uv: Vec::new(),
                 place: place(i, source),
             };
@@ -139,6 +119,31 @@ impl Materials {
     }
 }
 
+/// Which of the file's materials placed primitives name; the last entry is the default material.
+fn used(asset: &Asset, placements: &[Placement]) -> Result<Vec<bool>> {
+    let default = asset.json.materials.len();
+    let mut used = vec![false; default + 1];
+    let mut mesh_done = vec![false; asset.json.meshes.len()];
+    for placement in placements {
+        if std::mem::replace(&mut mesh_done[placement.mesh], true) {
+            continue;
+        }
+        let mesh = &asset.json.meshes[placement.mesh];
+        for (p, primitive) in mesh.primitives.iter().enumerate() {
+            if let Some(index) = primitive.material.filter(|&m| m >= default) {
+                let place = format!("mesh {}, primitive {p}", placement.mesh);
+                let what = format!("there is no material {index}");
+                return Err(asset.fault(place, what, BROKEN));
+            }
+            used[primitive.material.unwrap_or(default)] = true;
+        }
+    }
+    if !used.contains(&true) {
+        used[default] = true;
+    }
+    Ok(used)
+}
+
 fn place(index: usize, material: &json::Material) -> String {
     match &material.name {
         Some(name) => format!("material {index} ({name})"),
@@ -150,6 +155,8 @@ struct Reader<'a, 'b> {
     asset: &'a Asset<'b>,
     warnings: &'a mut Warnings,
     images: &'a mut Vec<usize>,
+    /// Place in `images` by the file's index; `u32::MAX` where it is not in use.
+    image_slots: &'a mut [u32],
     uv: Vec<UvSource>,
     place: String,
 }
@@ -178,26 +185,27 @@ impl Reader<'_, '_> {
             unlit: source.extensions.unlit.is_some(),
             ..Material::default()
         };
-        let mut base = pbr.base_color_texture.as_ref();
+        let mut base = pbr.base_color_texture.as_deref();
         if let (Some(sg), None) = (&source.extensions.specular_glossiness, base) {
             let what =
                 "KHR_materials_pbrSpecularGlossiness is read as its diffuse colour and roughness";
             self.warnings.say(what, &self.place);
-            base = sg.diffuse_texture.as_ref();
+            base = sg.diffuse_texture.as_deref();
             material.base_color_factor = sg.diffuse_factor.unwrap_or([1.0; 4]);
             material.metallic_factor = 0.0;
             material.roughness_factor = 1.0 - sg.glossiness_factor.unwrap_or(1.0);
         }
         // The order decides who gets a slot of texture coordinates: colour first.
         material.base_color = self.texture(base, "baseColorTexture")?;
-        material.normal = self.texture(source.normal_texture.as_ref(), "normalTexture")?;
-        let metallic = pbr.metallic_roughness_texture.as_ref();
+        material.normal = self.texture(source.normal_texture.as_deref(), "normalTexture")?;
+        let metallic = pbr.metallic_roughness_texture.as_deref();
         material.metallic_roughness = self.texture(metallic, "metallicRoughnessTexture")?;
-        material.occlusion = self.texture(source.occlusion_texture.as_ref(), "occlusionTexture")?;
-        material.emissive = self.texture(source.emissive_texture.as_ref(), "emissiveTexture")?;
-        let normal = source.normal_texture.as_ref();
+        material.occlusion =
+            self.texture(source.occlusion_texture.as_deref(), "occlusionTexture")?;
+        material.emissive = self.texture(source.emissive_texture.as_deref(), "emissiveTexture")?;
+        let normal = source.normal_texture.as_deref();
         material.normal_scale = normal.and_then(|t| t.scale).unwrap_or(1.0);
-        let occlusion = source.occlusion_texture.as_ref();
+        let occlusion = source.occlusion_texture.as_deref();
         material.occlusion_strength = occlusion.and_then(|t| t.strength).unwrap_or(1.0);
         self.clamp(&mut material)?;
         Ok(material)
@@ -269,15 +277,13 @@ impl Reader<'_, '_> {
                     .fault(place, format!("there is no sampler {s}"), BROKEN)
             })?,
         };
-        let image = match self.images.iter().position(|&i| i == image) {
-            Some(i) => i,
-            None => {
-                self.images.push(image);
-                self.images.len() - 1
-            }
-        };
+        let slot = &mut self.image_slots[image];
+        if *slot == u32::MAX {
+            *slot = self.images.len() as u32;
+            self.images.push(image);
+        }
         Ok(Some(TextureRef {
-            image: image as u32,
+            image: *slot,
             uv_set,
             wrap: [wrap(sampler.wrap_s), wrap(sampler.wrap_t)],
             linear: sampler.mag_filter != Some(9728),

@@ -23,6 +23,8 @@ mod meshopt;
 mod normalise;
 mod primitive;
 mod scene;
+mod skin;
+mod triangle;
 mod uri;
 mod warning;
 
@@ -82,7 +84,7 @@ pub fn load_with(path: &Path, limits: &Limits) -> Result<Model> {
 /// # Errors
 /// As [`load`].
 pub fn load_slice(bytes: &[u8], path: &Path, limits: &Limits) -> Result<Model> {
-    let (document, chunk) = container::open(bytes, path)?;
+    let (document, chunk) = container::open(bytes, path, limits)?;
     let mut warnings = Warnings::default();
     container::check_extensions(&document, path, &mut warnings)?;
     let asset = Asset::open(path, &document, bytes.len() as u64, chunk, limits)?;

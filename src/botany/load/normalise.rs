@@ -15,29 +15,36 @@ use crate::botany::model::{Frame, Model, Object};
 /// Doubled area (radius one) below which a triangle has none: products of steps of the f32 grid.
 const LEAST_AREA: f64 = 1e-15;
 
+/// Least radius in world units; below it, divisions by it leave the numbers.
+const LEAST_RADIUS: f64 = 1e-60;
+
 /// Builds the model, without materials and images.
 pub(super) fn assemble(
     asset: &Asset,
     placements: Vec<Placement>,
-    parts: Parts,
+    mut parts: Parts,
     warnings: &mut Warnings,
 ) -> Result<Model> {
-    check_size(asset, &placements, &parts)?;
-    let frame = frame(asset, &placements, &parts)?;
-    let placed = || {
-        placements
-            .iter()
-            .flat_map(|p| parts[p.mesh].iter().map(move |part| (p, part)))
-    };
-    let colored = placed().any(|(_, part)| !part.colors.is_empty());
-    let second = placed().any(|(_, part)| !part.uvs[1].is_empty());
+    let totals = totals(asset, &placements, &parts)?;
     let mut model = Model {
-        frame,
+        frame: frame(asset, &placements, &parts)?,
         ..Model::default()
     };
-    for (placement, part) in placed() {
-        let dropped = append(&mut model, placement, part, (colored, second));
-        warnings.count(DEGENERATE, dropped, &placement.name);
+    totals.reserve(&mut model);
+    // A mesh is freed after its last placement, so that a tree without instances is in memory
+    // once, not twice.
+    let mut last = vec![usize::MAX; parts.len()];
+    for (i, placement) in placements.iter().enumerate() {
+        last[placement.mesh] = i;
+    }
+    for (i, placement) in placements.iter().enumerate() {
+        for part in &parts[placement.mesh] {
+            let dropped = append(&mut model, placement, part, &totals);
+            warnings.count(DEGENERATE, dropped, &placement.name);
+        }
+        if last[placement.mesh] == i {
+            parts[placement.mesh] = Vec::new();
+        }
     }
     if model.triangles.is_empty() {
         return Err(nothing(asset));
@@ -53,45 +60,64 @@ fn nothing(asset: &Asset) -> crate::Error {
     )
 }
 
-fn check_size(asset: &Asset, placements: &[Placement], parts: &Parts) -> Result<()> {
-    let count = |p: &Placement| {
-        parts[p.mesh]
-            .iter()
-            .map(|part| part.triangles.len())
-            .sum::<usize>()
-    };
-    let mut total = 0usize;
-    for placement in placements {
-        total = total.saturating_add(count(placement));
-        if total > asset.limits.triangles {
-            let what = format!(
-                "the scene has more than the limit of {} triangles",
-                asset.limits.triangles
-            );
+/// Sizes of the model before it is built.
+#[derive(Default)]
+struct Totals {
+    triangles: usize,
+    vertices: usize,
+    colored: bool,
+    second_uv: bool,
+}
+
+impl Totals {
+    fn reserve(&self, model: &mut Model) {
+        let vertices = self.vertices;
+        model.positions.reserve_exact(vertices);
+        model.normals.reserve_exact(vertices);
+        model.uvs[0].reserve_exact(vertices);
+        model.uvs[1].reserve_exact(if self.second_uv { vertices } else { 0 });
+        model
+            .colors
+            .reserve_exact(if self.colored { vertices } else { 0 });
+        model.triangles.reserve_exact(self.triangles);
+        model.triangle_object.reserve_exact(self.triangles);
+    }
+}
+
+fn totals(asset: &Asset, placements: &[Placement], parts: &Parts) -> Result<Totals> {
+    let mut totals = Totals::default();
+    for part in placements.iter().flat_map(|p| &parts[p.mesh]) {
+        totals.triangles = totals.triangles.saturating_add(part.triangles.len());
+        totals.vertices = totals.vertices.saturating_add(part.positions.len());
+        totals.colored |= !part.colors.is_empty();
+        totals.second_uv |= !part.uvs[1].is_empty();
+        let most = asset.limits.triangles;
+        if totals.triangles > most || totals.vertices > u32::MAX as usize {
+            let what = format!("the scene has more than the limit of {most} triangles");
             return Err(asset.fault("scene", what, "split the scene: one tree a file"));
         }
     }
-    Ok(())
+    Ok(totals)
 }
 
 /// Centre of the bounding box, and the largest distance from it.
 fn frame(asset: &Asset, placements: &[Placement], parts: &Parts) -> Result<Frame> {
     let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     for_each_point(placements, parts, |p| {
-        (low, high) = (low.min(p), high.max(p))
+        (low, high) = (low.min(p), high.max(p));
     });
     if low.x > high.x {
         return Err(nothing(asset));
     }
     let center = low + 0.5 * (high - low);
-    let mut radius = 0.0f64;
+    // What is not a number passes by min and max unseen.
+    let (mut radius, mut finite) = (0.0f64, true);
     for_each_point(placements, parts, |p| {
-        radius = radius.max((p - center).length())
+        radius = radius.max((p - center).length());
+        finite &= p.is_finite();
     });
-    // A point that is not a number would pass by min and max unseen.
-    let mut finite = center.is_finite() && radius.is_finite();
-    for_each_point(placements, parts, |p| finite &= p.is_finite());
-    if !finite || radius < f64::from(f32::MIN_POSITIVE) * f64::EPSILON {
+    finite &= center.is_finite() && radius.is_finite();
+    if !finite || radius < LEAST_RADIUS {
         let what = format!("the tree reaches from {low} to {high}");
         return Err(asset.fault("scene", what, "apply transforms before the export"));
     }
@@ -100,28 +126,23 @@ fn frame(asset: &Asset, placements: &[Placement], parts: &Parts) -> Result<Frame
 
 fn for_each_point(placements: &[Placement], parts: &Parts, mut act: impl FnMut(DVec3)) {
     for placement in placements {
+        let matrix = placement.world_from_mesh;
         // An object scaled to nothing (a hidden one) is nowhere.
-        if placement.world_from_mesh.x_axis.truncate() == DVec3::ZERO
-            && placement.world_from_mesh.y_axis.truncate() == DVec3::ZERO
-            && placement.world_from_mesh.z_axis.truncate() == DVec3::ZERO
-        {
+        let axes = [matrix.x_axis, matrix.y_axis, matrix.z_axis];
+        if axes.iter().all(|a| a.truncate() == DVec3::ZERO) {
             continue;
         }
-        for part in &parts[placement.mesh] {
-            for p in &part.positions {
-                act(placement.world_from_mesh.transform_point3(p.as_dvec3()));
-            }
+        for p in parts[placement.mesh]
+            .iter()
+            .flat_map(|part| &part.positions)
+        {
+            act(matrix.transform_point3(p.as_dvec3()));
         }
     }
 }
 
 /// Adds one placed part; returns how many triangles lost their area.
-fn append(
-    model: &mut Model,
-    placement: &Placement,
-    part: &Part,
-    (colored, second): (bool, bool),
-) -> u64 {
+fn append(model: &mut Model, placement: &Placement, part: &Part, totals: &Totals) -> u64 {
     let Frame { center, radius } = model.frame;
     let base = model.positions.len() as u32;
     let matrix = placement.world_from_mesh;
@@ -146,7 +167,7 @@ fn append(
     }
     model.triangle_object.resize(model.triangles.len(), object);
     model.objects.push(Object {
-        name: placement.name.clone(),
+        name: placement.name.to_string(),
         mesh: placement.mesh as u32,
         primitive: part.primitive as u32,
         material: part.material,
@@ -161,12 +182,12 @@ fn append(
     model.normals.extend(part.normals.iter().map(normal));
     let total = model.positions.len();
     for (slot, list) in model.uvs.iter_mut().enumerate() {
-        if slot == 0 || second {
+        if slot == 0 || totals.second_uv {
             list.extend_from_slice(&part.uvs[slot]);
             list.resize(total, Vec2::ZERO);
         }
     }
-    if colored {
+    if totals.colored {
         model.colors.extend_from_slice(&part.colors);
         model.colors.resize(total, [1.0; 4]);
     }

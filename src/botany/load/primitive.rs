@@ -1,12 +1,13 @@
 //! Primitives: accessors become the triangles of one part in its own space.
 
-use glam::{DVec3, Vec2, Vec3};
+use glam::{Vec2, Vec3};
 
 use super::accessor::Integers;
 use super::buffer::{Asset, BROKEN};
 use super::json::Primitive;
 use super::material::{Materials, UvSource};
 use super::scene::Placement;
+use super::triangle::{self, face_normals, has_area, renumber};
 use super::warning::Warnings;
 use crate::Result;
 
@@ -89,7 +90,7 @@ impl Reader<'_> {
         drop(flat);
 
         // 2. Only vertices in use are read: primitives often share one large buffer.
-        let used = renumber(&mut triangles, vertex_count);
+        let used = renumber(&mut triangles);
         let place = self.at("POSITION");
         let positions = self
             .asset
@@ -101,7 +102,7 @@ impl Reader<'_> {
         triangles.retain(|&t| has_area(t, &positions));
         let dropped = (before - triangles.len()) as u64;
         warnings.count(DEGENERATE, dropped, &self.place);
-        let kept = renumber(&mut triangles, positions.len());
+        let kept = renumber(&mut triangles);
         let used: Vec<u32> = kept.iter().map(|&k| used[k as usize]).collect();
         let positions: Vec<Vec3> = kept.iter().map(|&k| positions[k as usize]).collect();
 
@@ -129,8 +130,7 @@ impl Reader<'_> {
     }
 
     fn check_readable(&self, warnings: &mut Warnings) -> Result<()> {
-        let extensions = self.primitive.extensions.as_ref();
-        let draco = extensions.is_some_and(|e| e.contains_key("KHR_draco_mesh_compression"));
+        let draco = self.primitive.extensions.draco.is_some();
         let position = self.primitive.attributes.get("POSITION");
         let accessor = position.and_then(|&a| self.asset.json.accessors.get(a));
         if draco && accessor.is_none_or(|a| a.buffer_view.is_none()) {
@@ -140,12 +140,7 @@ impl Reader<'_> {
                 "decompress it (gltf-transform copy in.glb out.glb), or export without Draco; meshopt compression is read",
             ));
         }
-        if self
-            .primitive
-            .targets
-            .as_ref()
-            .is_some_and(|t| !t.is_empty())
-        {
+        if !self.primitive.targets.is_empty() {
             let what = "morph targets are ignored: the mesh is read in its base shape";
             warnings.say(what, &self.place);
         }
@@ -217,29 +212,9 @@ impl Reader<'_> {
 
     /// Lists, strips and fans become a list; triangles that repeat a vertex are left out.
     fn triangles(&self, mode: u32, flat: &[u32], warnings: &mut Warnings) -> Result<Vec<[u32; 3]>> {
-        let all: Vec<[u32; 3]> = match mode {
-            4 => flat.as_chunks::<3>().0.to_vec(),
-            // Every second triangle of a strip turns the other way (glTF 2.0, section 3.7.2.1).
-            5 => flat
-                .windows(3)
-                .enumerate()
-                .map(|(i, w)| {
-                    if i % 2 == 0 {
-                        [w[0], w[1], w[2]]
-                    } else {
-                        [w[0], w[2], w[1]]
-                    }
-                })
-                .collect(),
-            6 => flat
-                .windows(2)
-                .skip(1)
-                .map(|w| [flat[0], w[0], w[1]])
-                .collect(),
-            other => {
-                let what = format!("the primitive mode is {other}");
-                return Err(self.asset.fault(&self.place, what, BROKEN));
-            }
+        let Some(all) = triangle::list(mode, flat) else {
+            let what = format!("the primitive mode is {mode}");
+            return Err(self.asset.fault(&self.place, what, BROKEN));
         };
         if mode == 4 && !flat.len().is_multiple_of(3) {
             let what = "the last indices of a primitive make no whole triangle and are ignored";
@@ -336,69 +311,3 @@ impl Reader<'_> {
 
 /// What is said of triangles without an area.
 pub(super) const DEGENERATE: &str = "a triangle without an area is dropped";
-
-/// Numbers the vertices in use from 0 in ascending order of their old numbers; returns the old.
-fn renumber(triangles: &mut [[u32; 3]], vertex_count: usize) -> Vec<u32> {
-    let low = triangles.iter().flatten().min().copied().unwrap_or(0);
-    let high = triangles.iter().flatten().max().copied().unwrap_or(0);
-    debug_assert!(triangles.is_empty() || (high as usize) < vertex_count);
-    if triangles.is_empty() {
-        return Vec::new();
-    }
-    let mut new = vec![u32::MAX; (high - low) as usize + 1];
-    for &v in triangles.iter().flatten() {
-        new[(v - low) as usize] = 0;
-    }
-    let mut used = Vec::new();
-    for (v, slot) in new.iter_mut().enumerate() {
-        if *slot == 0 {
-            *slot = used.len() as u32;
-            used.push(low + v as u32);
-        }
-    }
-    for v in triangles.iter_mut().flatten() {
-        *v = new[(*v - low) as usize];
-    }
-    used
-}
-
-/// Twice the area vector of a triangle; exact zero where its corners lie on one line of the f32 grid.
-fn cross([a, b, c]: [u32; 3], positions: &[Vec3]) -> DVec3 {
-    let [a, b, c] = [a, b, c].map(|i| positions[i as usize].as_dvec3());
-    (b - a).cross(c - a)
-}
-
-fn has_area(triangle: [u32; 3], positions: &[Vec3]) -> bool {
-    cross(triangle, positions) != DVec3::ZERO
-}
-
-/// Normals of vertices: the sum of their faces' normals, weighted by area.
-///
-/// The specification asks for flat normals, which would need three vertices a triangle; files
-/// without normals (MTree's) are welded skins, which their authors see smooth.
-fn face_normals(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<Vec3> {
-    let mut sums = vec![DVec3::ZERO; positions.len()];
-    // Any face serves where faces cancel out (a vertex shared by both sides of a leaf).
-    let mut one = vec![DVec3::ZERO; positions.len()];
-    for &triangle in triangles {
-        let normal = cross(triangle, positions);
-        for i in triangle {
-            sums[i as usize] += normal;
-            one[i as usize] = normal;
-        }
-    }
-    let unit = |(sum, one): (DVec3, DVec3)| {
-        let sum = if sum.length_squared() > 1e-12 * one.length_squared() {
-            sum
-        } else {
-            one
-        };
-        // Scaled first: areas of small triangles underflow when they are squared.
-        let largest = sum.abs().max_element();
-        (sum / largest)
-            .try_normalize()
-            .unwrap_or(DVec3::Y)
-            .as_vec3()
-    };
-    sums.into_iter().zip(one).map(unit).collect()
-}

@@ -1,16 +1,19 @@
 //! Nodes: which mesh stands where in the world.
 
+use std::rc::Rc;
+
 use glam::{DMat4, DQuat, DVec3};
 
 use super::accessor::Integers;
 use super::buffer::{Asset, BROKEN};
 use super::json::Node;
+use super::skin;
 use super::warning::Warnings;
 use crate::Result;
 
 /// One mesh, placed once.
 pub(super) struct Placement {
-    pub name: String,
+    pub name: Rc<str>,
     pub mesh: usize,
     pub world_from_mesh: DMat4,
 }
@@ -25,6 +28,8 @@ pub(super) fn placements(asset: &Asset, warnings: &mut Warnings) -> Result<Vec<P
         .map(|root| (root, DMat4::IDENTITY))
         .collect();
     let mut out = Vec::new();
+    let mut worlds: Vec<Option<DMat4>> = vec![None; nodes.len()];
+    let mut skinned = Vec::new();
     while let Some((index, world_from_parent)) = stack.pop() {
         let Some(node) = nodes.get(index) else {
             return Err(asset.fault("nodes", format!("there is no node {index}"), BROKEN));
@@ -46,15 +51,24 @@ pub(super) fn placements(asset: &Asset, warnings: &mut Warnings) -> Result<Vec<P
             return Err(asset.fault(place, what, "apply transforms before the export"));
         }
         if let Some(mesh) = node.mesh {
-            if node.skin.is_some() {
-                warnings.say("a skinned mesh is read as it is stored, without its bones; if it looks wrong, apply the armature before the export", &place);
-            }
+            let first = out.len();
             place_mesh(asset, node, mesh, world_from_node, &place, &mut out)?;
+            if let Some(skin) = node.skin {
+                skinned.push((skin, first..out.len(), place.clone()));
+            }
         }
+        worlds[index] = Some(world_from_node);
         stack.extend(node.children.iter().rev().map(|&c| (c, world_from_node)));
         if stack.len() > nodes.len() {
             let what = "its children are more than the file's nodes: a node has two parents";
             return Err(asset.fault(place, what, BROKEN));
+        }
+    }
+    // Bones may come after the mesh that they carry.
+    for (skin, range, place) in skinned {
+        let world_from_mesh = skin::rest(asset, skin, &worlds, &place, warnings)?;
+        for placement in &mut out[range] {
+            placement.world_from_mesh = world_from_mesh;
         }
     }
     Ok(out)
@@ -125,7 +139,9 @@ fn place_mesh(
         return Err(asset.fault(place, format!("there is no mesh {mesh}"), BROKEN));
     };
     let name = node.name.as_ref().or(content.name.as_ref());
-    let name = name.cloned().unwrap_or_default();
+    // A hostile name times a million instances would fill the memory.
+    let name: String = name.map_or("", String::as_str).chars().take(200).collect();
+    let name: Rc<str> = name.into();
     let extensions = node.extensions.as_deref();
     let instances = match extensions.and_then(|e| e.instancing.as_ref()) {
         None => vec![DMat4::IDENTITY],

@@ -1,0 +1,217 @@
+//! Nodes, instances, skins, and the move to normalised space.
+
+use glam::Vec3;
+use serde_json::{Value, json};
+
+use crate::file::*;
+
+#[test]
+fn transforms_compose_down_the_hierarchy() {
+    let mut file = File::triangle();
+    file.json["scenes"][0]["nodes"] = json!([1]);
+    let half = std::f64::consts::FRAC_1_SQRT_2;
+    // Scale by 3, turn a quarter about z, move; then the parent's matrix moves by (0, 0, 7).
+    file.json["nodes"] = json!([
+        { "mesh": 0, "scale": [3, 3, 3], "rotation": [0, 0, half, half], "translation": [10, 0, 0], "name": "twig" },
+        { "children": [0], "matrix": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 7, 1] },
+    ]);
+    let model = file.load().unwrap();
+    assert_eq!(
+        world(&model),
+        [[[10.0, 0.0, 7.0], [10.0, 6.0, 7.0], [4.0, 0.0, 7.0]]]
+    );
+    assert_eq!(model.objects[0].name, "twig");
+}
+
+#[test]
+fn a_mirror_turns_triangles_round_and_keeps_normals_outside() {
+    let mut file = File::triangle();
+    file.json["nodes"][0]["scale"] = json!([-1, 1, 1]);
+    let model = file.load().unwrap();
+    assert_eq!(
+        world(&model),
+        [[[0.0; 3], [0.0, 2.0, 0.0], [-2.0, 0.0, 0.0]]]
+    );
+    let [a, b, c] = model.corners(0);
+    assert!((b - a).cross(c - a).normalize().distance(Vec3::Z) < 1e-6);
+    assert_eq!(model.normals, [Vec3::Z; 3]);
+}
+
+#[test]
+fn normals_stay_perpendicular_under_uneven_scale() {
+    let mut file = File::new();
+    let p = file.floats("VEC3", &[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]);
+    file.mesh(json!({ "attributes": { "POSITION": p } }));
+    file.json["nodes"][0]["scale"] = json!([1, 2, -5]);
+    let model = file.load().unwrap();
+    let [a, b, c] = model.corners(0);
+    let face = (b - a).cross(c - a).normalize();
+    assert!(
+        model.normals[0].distance(face) < 1e-5,
+        "{} {face}",
+        model.normals[0]
+    );
+    // Flattened leaves still have a normal.
+    file.json["nodes"][0]["scale"] = json!([1, 1, 0]);
+    let model = file.load().unwrap();
+    assert!(model.normals[0].distance(Vec3::Z) < 1e-6);
+}
+
+#[test]
+fn shared_meshes_and_instances_are_expanded_and_tell_their_objects() {
+    let mut file = File::triangle();
+    let t = file.floats("VEC3", &[0.0, 0.0, 0.0, 0.0, 0.0, 4.0]);
+    let s = file.floats("VEC3", &[1.0, 1.0, 1.0, 0.5, 0.5, 0.5]);
+    // Half a turn about x, as normalised bytes.
+    let r = file.accessor(&[0, 0, 0, 127, 127, 0, 0, 0], I8, "VEC4", 2);
+    let attributes = json!({ "TRANSLATION": t, "SCALE": s, "ROTATION": r });
+    file.node(json!({ "mesh": 0, "name": "i", "extensions": { "EXT_mesh_gpu_instancing": { "attributes": attributes } } }));
+    file.node(json!({ "mesh": 0, "translation": [0, 0, -1] }));
+    let model = file.load().unwrap();
+    let want = [
+        [[0.0; 3], [2.0, 0.0, 0.0], [0.0, 2.0, 0.0]],
+        [[0.0; 3], [2.0, 0.0, 0.0], [0.0, 2.0, 0.0]],
+        [[0.0, 0.0, 4.0], [1.0, 0.0, 4.0], [0.0, -1.0, 4.0]],
+        [[0.0, 0.0, -1.0], [2.0, 0.0, -1.0], [0.0, 2.0, -1.0]],
+    ];
+    assert_eq!(world(&model), want);
+    assert_eq!(model.triangle_object, [0, 1, 2, 3]);
+    let names: Vec<&str> = model.objects.iter().map(|o| o.name.as_str()).collect();
+    assert_eq!(names, ["", "i", "i", ""]);
+}
+
+/// A small tree-like heap of triangles in one mesh under two nodes.
+fn heap(change: impl Fn(&mut Value)) -> pleach::botany::Model {
+    let mut file = File::new();
+    let mut seed = 7u32;
+    let mut next = || {
+        seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (seed >> 8) as f32 / (1 << 24) as f32
+    };
+    let values: Vec<f32> = (0..600 * 9).map(|_| next() * 20.0 - 3.0).collect();
+    let p = file.floats("VEC3", &values);
+    let mesh = file.add(
+        "meshes",
+        json!({ "primitives": [{ "attributes": { "POSITION": p } }] }),
+    );
+    let child = file.add(
+        "nodes",
+        json!({ "mesh": mesh, "rotation": [0.1, 0.7, 0.2, 0.6], "translation": [1, 2, 3] }),
+    );
+    let root = file.node(json!({ "children": [child] }));
+    change(&mut file.json["nodes"][root]);
+    file.load().unwrap()
+}
+
+#[test]
+fn metres_centimetres_and_100_km_away_give_the_same_model() {
+    let here = heap(|_| ());
+    let cases: [(&str, Value, f64); 4] = [
+        ("centimetres", json!({ "scale": [100, 100, 100] }), 100.0),
+        (
+            "kilometres",
+            json!({ "scale": [0.001, 0.001, 0.001] }),
+            0.001,
+        ),
+        (
+            "100 km away",
+            json!({ "translation": [1e5, -3e4, 1e5] }),
+            1.0,
+        ),
+        (
+            "far and in millimetres",
+            json!({ "scale": [1e3, 1e3, 1e3], "translation": [1e8, 0, -1e8] }),
+            1e3,
+        ),
+    ];
+    for (name, place, scale) in cases {
+        let there = heap(|node| {
+            for (key, value) in place.as_object().unwrap() {
+                node[key] = value.clone();
+            }
+        });
+        assert_eq!(here.triangles, there.triangles, "{name}");
+        assert!(
+            (there.frame.radius / here.frame.radius / scale - 1.0).abs() < 1e-9,
+            "{name}"
+        );
+        let furthest = |a: &[Vec3], b: &[Vec3]| {
+            a.iter()
+                .zip(b)
+                .map(|(a, b)| a.distance(*b))
+                .fold(0.0, f32::max)
+        };
+        assert!(furthest(&here.positions, &there.positions) < 2e-7, "{name}");
+        assert!(furthest(&here.normals, &there.normals) < 2e-7, "{name}");
+    }
+    assert!(here.positions.iter().all(|p| p.length() < 1.0 + 1e-6));
+    assert!(here.positions.iter().any(|p| p.length() > 1.0 - 1e-6));
+}
+
+#[test]
+fn a_deep_chain_of_nodes_loads_and_circles_are_refused() {
+    let mut file = File::triangle();
+    let depth = 100_000;
+    let chain = |i: usize| json!({ "children": [i + 2] });
+    let mut nodes: Vec<Value> = (0..depth).map(chain).collect();
+    nodes.insert(0, json!({}));
+    nodes.push(json!({ "mesh": 0 }));
+    file.json["nodes"] = json!(nodes);
+    file.json["scenes"][0]["nodes"] = json!([1]);
+    assert_eq!(file.load().unwrap().triangles.len(), 1);
+
+    for children in [json!([0]), json!([1]), json!([2, 2])] {
+        let mut file = File::triangle();
+        file.json["nodes"] = json!([{ "mesh": 0, "children": [1] }, { "children": children }, {}]);
+        assert!(file.error().contains("twice") || file.error().contains("two parents"));
+    }
+}
+
+#[test]
+fn a_skinned_mesh_in_bind_pose_is_read_and_a_bent_one_refused() {
+    let mut file = File::triangle();
+    // Both bones undo their binding up to a scale of 2; the mesh's own node must not count.
+    let bind = |x: f32| {
+        [
+            1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, -x, 0.0, 0.0, 1.0,
+        ]
+    };
+    let binds = file.floats("MAT4", &[bind(1.0), bind(3.0)].concat());
+    file.add(
+        "skins",
+        json!({ "joints": [1, 2], "inverseBindMatrices": binds }),
+    );
+    file.json["nodes"] = json!([
+        { "mesh": 0, "skin": 0, "translation": [50, 50, 50] },
+        { "scale": [2, 2, 2], "translation": [2, 0, 0], "children": [2] },
+        { "translation": [2, 0, 0] },
+    ]);
+    file.json["scenes"][0]["nodes"] = json!([0, 1]);
+    let model = file.load().unwrap();
+    assert_eq!(
+        world(&model),
+        [[[0.0; 3], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]]]
+    );
+    assert!(model.warnings[0].contains("bind pose"));
+    file.json["nodes"][2]["rotation"] = json!([0, 0, 0.1, 0.99]);
+    assert!(file.error().contains("bent by bones"));
+}
+
+#[test]
+fn what_is_not_shown_is_not_read() {
+    let mut file = File::triangle();
+    let lines = file.add(
+        "meshes",
+        json!({ "primitives": [{ "attributes": { "POSITION": 0 }, "mode": 1 }] }),
+    );
+    file.node(json!({ "mesh": lines }));
+    file.node(json!({ "mesh": 0, "extensions": { "KHR_node_visibility": { "visible": false } } }));
+    file.node(json!({ "mesh": 0, "scale": [0, 0, 0], "translation": [1e6, 0, 0] }));
+    // In no scene, and broken: nobody looks at it.
+    file.add("nodes", json!({ "mesh": 99 }));
+    let model = file.load().unwrap();
+    assert_eq!(model.triangles.len(), 1);
+    assert!(model.frame.radius < 2.0);
+    assert_eq!(model.warnings.len(), 3, "{:?}", model.warnings);
+    assert_eq!(model.objects.len(), 1);
+}
