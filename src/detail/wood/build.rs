@@ -59,8 +59,22 @@ impl Wood<'_> {
                 corners[0].center = path.base;
                 append_tube(wood, rings, &corners, *sides, zero, *two_faces, out);
             }
+            (Shape::Absent, _) => {}
             _ => self.append_original(wood, radius_scale, out),
         }
+    }
+
+    /// All wood of a level: every chain as chosen, what is left out made up for in the width of
+    /// its neighbours, and the loose triangles.
+    pub fn build(&self, chosen: &[usize], radius_scale: f32) -> WoodMesh {
+        let mut mesh = WoodMesh::default();
+        let widening = self.widening(chosen);
+        for (chain, &option) in chosen.iter().enumerate() {
+            let scale = radius_scale * widening[chain];
+            self.build_tube(chain as u32, option, scale, &mut mesh);
+        }
+        self.build_loose(&mut mesh);
+        mesh
     }
 
     /// Appends the wood that hangs on no skeleton node, unchanged.
@@ -72,9 +86,8 @@ impl Wood<'_> {
         let Some((path, _)) = wood.tube.as_ref().filter(|_| radius_scale != 1.0) else {
             return self.append_triangles(&wood.triangles, |_, p| p, out);
         };
-        let slots = super::node_slots(self.tree);
         let widen = |triangle: u32, position: Vec3| {
-            let slot = slots[self.tree.wood_node[triangle as usize] as usize] as usize;
+            let slot = self.slots[self.tree.wood_node[triangle as usize] as usize] as usize;
             let axis = path.nearest(position.as_dvec3(), path.slot_to_point[slot] as usize);
             let out = position - axis.as_vec3();
             axis.as_vec3() + out * radius_scale

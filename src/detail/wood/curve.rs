@@ -17,7 +17,7 @@ const RIBBON_DEVIATION: f64 = 0.5;
 #[derive(Clone, Debug, PartialEq)]
 pub struct ChainCurve {
     /// Fewest triangles first; triangles rise, errors fall, and their slopes flatten. Never
-    /// empty. The last option has the error zero.
+    /// empty. The first may have no triangle, the last has the error zero.
     pub options: Vec<WoodOption>,
 }
 
@@ -36,6 +36,8 @@ pub struct WoodOption {
 /// What stands for a chain.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Shape {
+    /// Nothing; a neighbour is drawn wider instead (see [`Wood::widening`](super::Wood::widening)).
+    Absent,
     /// Its own triangles.
     Original,
     /// Rings of `sides` corners, or of two for a flat ribbon; a last ring of radius zero is a
@@ -60,6 +62,24 @@ impl ChainCurve {
                 error: 0.0,
                 shape,
             }],
+        }
+    }
+
+    /// Adds the option of no triangle at all, with its error, and drops what it makes needless.
+    pub(super) fn may_be_absent(&mut self, error: Option<f64>) {
+        let Some(error) = error else { return };
+        let slope = |o: &WoodOption| (error - o.error) / f64::from(o.triangles.max(1));
+        let steepest = self.options.iter().map(slope).fold(f64::MIN, f64::max);
+        // Tangent from the new point to the hull: what lies before it is no bargain any more.
+        let keep = self.options.iter().position(|o| slope(o) >= steepest);
+        self.options.drain(..keep.unwrap_or(0));
+        if self.options[0].triangles > 0 {
+            let absent = WoodOption {
+                triangles: 0,
+                error: error.max(self.options[0].error),
+                shape: Shape::Absent,
+            };
+            self.options.insert(0, absent);
         }
     }
 

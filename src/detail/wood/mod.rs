@@ -17,6 +17,7 @@ mod curve;
 mod fit;
 mod path;
 mod rings;
+mod thin;
 
 use rayon::prelude::*;
 
@@ -28,17 +29,24 @@ pub use curve::{ChainCurve, Shape, WoodOption};
 
 use bark::Bark;
 use path::Path;
+use thin::Absence;
 
 /// The wood of a tree, ready to be simplified chain by chain.
 pub struct Wood<'a> {
     tree: &'a Tree,
     chains: Vec<ChainWood>,
+    /// For each chain, what leaving it out means.
+    absences: Vec<Option<Absence>>,
     loose: Vec<u32>,
+    /// For each node its place in its chain.
+    slots: Vec<u32>,
 }
 
 /// One chain: its triangles, its centre line, its bark, and what it costs.
 struct ChainWood {
     triangles: Vec<u32>,
+    /// Surface of the triangles.
+    area: f64,
     /// `None` where no tube can stand in for the triangles (no length or no area).
     tube: Option<(Path, Bark)>,
     curve: ChainCurve,
@@ -52,17 +60,23 @@ impl<'a> Wood<'a> {
     pub fn new(tree: &'a Tree, double_sided: bool) -> Self {
         let (by_chain, loose) = triangles_by_chain(tree);
         let slots = node_slots(tree);
-        let chains = by_chain
+        let mut chains: Vec<_> = by_chain
             .into_par_iter()
             .enumerate()
             .map(|(chain, triangles)| {
                 ChainWood::new(tree, chain as u32, triangles, &slots, double_sided)
             })
             .collect();
+        let absences = thin::absences(tree, &chains);
+        for (chain, absence) in chains.iter_mut().zip(&absences) {
+            chain.curve.may_be_absent(absence.map(|a| a.error));
+        }
         Self {
             tree,
             chains,
+            absences,
             loose,
+            slots,
         }
     }
 
@@ -83,11 +97,7 @@ impl<'a> Wood<'a> {
 
     /// Surface area of a chain's own triangles, normalised units squared.
     pub fn area(&self, chain: u32) -> f64 {
-        let wood = &self.chains[chain as usize];
-        match &wood.tube {
-            Some((path, _)) => path.area,
-            None => surface(self.tree, &wood.triangles),
-        }
+        self.chains[chain as usize].area
     }
 
     /// The original triangles of a chain.
@@ -128,6 +138,37 @@ impl<'a> Wood<'a> {
         }
         chosen
     }
+
+    /// Repairs a choice in which a chain is left out that carries one which is not: the carrier
+    /// gets its cheapest shape. Returns the triangles that this adds.
+    pub fn settle(&self, chosen: &mut [usize]) -> u32 {
+        let mut added = 0;
+        for chain in (0..self.chains.len()).rev() {
+            if self.is_absent(chain, chosen[chain]) {
+                continue;
+            }
+            // Carriers have smaller indices: one backward pass reaches every root.
+            if let Some(carrier) = self.tree.skeleton.chains[chain].parent {
+                let carrier = carrier as usize;
+                if self.is_absent(carrier, chosen[carrier]) {
+                    chosen[carrier] += 1;
+                    added += self.chains[carrier].curve.options[1].triangles;
+                }
+            }
+        }
+        added
+    }
+
+    /// For each chain the factor of its radius that makes up for the chains that `chosen` leaves
+    /// out; at least 1 for those that are drawn.
+    pub fn widening(&self, chosen: &[usize]) -> Vec<f32> {
+        let areas: Vec<_> = self.chains.iter().map(|c| c.area).collect();
+        thin::widening(&areas, &self.absences, |c| self.is_absent(c, chosen[c]))
+    }
+
+    fn is_absent(&self, chain: usize, option: usize) -> bool {
+        self.chains[chain].curve.options[option].shape == Shape::Absent
+    }
 }
 
 impl ChainWood {
@@ -151,6 +192,7 @@ impl ChainWood {
         };
         Self {
             triangles,
+            area,
             tube,
             curve,
         }

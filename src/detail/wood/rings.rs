@@ -78,7 +78,7 @@ pub(super) fn removal_order(path: &Path, samples: &[Sample]) -> Vec<u32> {
 
 /// A cost with a total order.
 #[derive(PartialEq)]
-struct Cost(f64);
+pub(super) struct Cost(pub f64);
 impl Eq for Cost {}
 impl PartialOrd for Cost {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {

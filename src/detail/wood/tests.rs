@@ -259,7 +259,7 @@ fn a_side_branch_starts_inside_its_carrier() {
     let twig = [0.12, 0.3, 0.5].map(|x| (Vec3::new(x, 0.6, 0.0), 0.01));
     add_tube(&mut tree, &twig, 6, Some((0, 3)));
     let wood = Wood::new(&tree, true);
-    for option in 0..wood.tube_options(1).options.len() - 1 {
+    for option in 1..wood.tube_options(1).options.len() - 1 {
         let mut mesh = WoodMesh::default();
         wood.build_tube(1, option, 1.0, &mut mesh);
         let foot = mesh.positions.iter().map(|p| p.x).fold(f32::MAX, f32::min);
@@ -308,27 +308,71 @@ fn degenerate_chains_have_an_answer() {
     }
 }
 
-#[test]
-fn a_budget_is_kept_and_used() {
-    let mut tree = tree_of(&line(30, 0.05, 0.02, 0.2), 10);
+/// A trunk of 30 nodes with 20 twigs of 10, spread along it.
+fn twiggy() -> Tree {
+    let mut tree = tree_of(&line(30, 0.05, 0.02, 0.0), 10);
     for i in 0..20 {
-        let shift = Vec3::new(0.0, 0.0, i as f32);
+        let foot = Vec3::new(0.0, (i + 5) as f32 / 29.0, 0.0);
         let twig: Vec<_> = line(10, 0.01, 0.002, 0.1)
             .iter()
-            .map(|&(p, r)| (p + shift, r))
+            .map(|&(p, r)| (foot + Vec3::new(0.3 * p.y, 0.1 * p.y, 0.2 * p.x), r))
             .collect();
-        add_tube(&mut tree, &twig, 6, None);
+        add_tube(&mut tree, &twig, 6, Some((0, i + 5)));
     }
+    tree
+}
+
+fn cost(wood: &Wood, chosen: &[usize]) -> u64 {
+    let each = chosen.iter().enumerate();
+    each.map(|(c, &o)| u64::from(wood.tube_options(c as u32).options[o].triangles))
+        .sum()
+}
+
+#[test]
+fn a_budget_is_kept_and_used() {
+    let tree = twiggy();
     let wood = Wood::new(&tree, true);
-    let cost = |chosen: &[usize]| -> u32 {
-        let each = chosen.iter().enumerate();
-        each.map(|(c, &o)| wood.tube_options(c as u32).options[o].triangles)
-            .sum()
-    };
-    for budget in [21, 100, 500, 2000] {
-        let total = cost(&wood.choose(budget));
-        assert!(u64::from(total) <= budget && total as f64 > 0.8 * budget as f64);
+    for budget in [8, 21, 100, 500, 2000] {
+        let total = cost(&wood, &wood.choose(budget));
+        assert!(
+            total <= budget && total as f64 > 0.7 * budget as f64,
+            "{budget}: {total}"
+        );
     }
-    assert_eq!(cost(&wood.choose(0)), 21, "nothing may vanish");
     assert_eq!(wood.choose(500), Wood::new(&tree, true).choose(500));
+}
+
+#[test]
+fn what_is_left_out_is_drawn_on_neighbours() {
+    let tree = twiggy();
+    let wood = Wood::new(&tree, false);
+    let whole: f64 = (0..21).map(|c| wood.area(c)).sum();
+    for budget in [2, 8, 20, 60] {
+        let mut chosen = wood.choose(budget);
+        wood.settle(&mut chosen);
+        let mesh = wood.build(&chosen, 1.0);
+        assert_eq!(mesh.triangles.len() as u64, cost(&wood, &chosen));
+        // What starts inside the trunk is drawn on top: a little more, never less.
+        let ratio = mesh_surface(&mesh) / whole;
+        assert!((0.99..1.25).contains(&ratio), "{budget}: {ratio}");
+        let widening = wood.widening(&chosen);
+        let drawn: f64 = (0..21)
+            .map(|c| wood.area(c as u32) * f64::from(widening[c]))
+            .sum();
+        assert!((drawn / whole - 1.0).abs() < 1e-5, "{drawn} of {whole}");
+    }
+}
+
+#[test]
+fn a_branch_never_floats() {
+    let mut tree = twiggy();
+    let twig = [0.2, 0.5, 0.9].map(|x| (Vec3::new(0.3, 0.5 + x, 0.4), 0.02));
+    add_tube(&mut tree, &twig, 6, Some((3, 30 + 25)));
+    let wood = Wood::new(&tree, true);
+    let mut chosen = vec![0; wood.len()];
+    chosen[21] = 2;
+    assert_eq!(wood.tube_options(3).options[0].shape, Shape::Absent);
+    let added = wood.settle(&mut chosen);
+    assert!(chosen[3] == 1 && added >= 1);
+    assert_eq!(wood.settle(&mut chosen), 0, "settling settles");
 }
