@@ -10,10 +10,13 @@ use crate::detail::level::{LevelPlan, Planner};
 use crate::detail::merge::Hierarchy;
 use crate::detail::optimal_cut::Choice;
 use crate::detail::reassign::Reassign;
+use crate::detail::whole_tree::whole_tree;
+use crate::detail::wood::{Wood, WoodMesh, WoodOption};
 use crate::export::chart::Chart;
 use crate::export::foliage::{BakeOptions, Foliage};
-use crate::export::gltf::{Scene, Surface, scene_of_model};
+use crate::export::gltf::{Scene, Surface, scene_of_wood};
 use crate::export::matching::{AreaGoal, Matched, match_area};
+use crate::export::mip::shrink;
 use crate::export::original::{Original, camera};
 use crate::export::refine::{Refine, refine};
 use crate::recipe::Recipe;
@@ -27,6 +30,8 @@ pub struct Baker<'a> {
     pub elements: &'a [Element],
     /// How they merge.
     pub hierarchy: &'a Hierarchy,
+    /// The branches' tubes.
+    pub wood: &'a Wood<'a>,
     /// The original's masks.
     pub original: &'a Original,
     /// Knobs.
@@ -59,6 +64,9 @@ pub struct Level {
     pub atlas: [u32; 2],
 }
 
+/// Levels of at most so many triangles are whole-tree billboards.
+const WHOLE_TREE_TRIANGLES: u64 = 24;
+
 impl Baker<'_> {
     /// Makes one level.
     pub fn level(&self, request: LevelRequest) -> Level {
@@ -81,9 +89,25 @@ impl Baker<'_> {
                 neighbours: 12,
             },
         };
-        let plan = planner.plan(request.triangles);
-        let mut scene = self.wood(&plan);
-        let pixels = height_px / self.original.height;
+        let whole = request.triangles <= WHOLE_TREE_TRIANGLES;
+        let plan = if whole {
+            whole_tree(
+                &self.tree.model,
+                self.elements,
+                &self.radii(),
+                request.triangles,
+            )
+        } else {
+            planner.plan(request.triangles)
+        };
+        let mut scene = self.wood(&plan, height_px);
+        // Levels are looked at from nearer than they are made for: never fewer texels than this.
+        let texels_px = if whole {
+            height_px.max(128.0)
+        } else {
+            height_px.max(256.0)
+        };
+        let pixels = texels_px / self.original.height;
         let mut foliage = Foliage::bake(
             &self.tree.model,
             &plan.cards,
@@ -133,24 +157,56 @@ impl Baker<'_> {
     }
 
     fn choices(&self) -> Vec<Vec<Choice>> {
+        let choice = |o: &WoodOption| Choice {
+            triangles: o.triangles,
+            error: o.error,
+        };
         self.elements
             .iter()
             .map(|e| match e.chain {
-                Some(_) => vec![Choice {
-                    triangles: e.triangles.len() as u32,
-                    error: 0.0,
-                }],
+                Some(chain) => self
+                    .wood
+                    .tube_options(chain)
+                    .options
+                    .iter()
+                    .map(choice)
+                    .collect(),
                 None => Vec::new(),
             })
             .collect()
     }
 
-    fn wood(&self, plan: &LevelPlan) -> Scene {
-        let triangles = plan
-            .tubes
+    /// Mean radius of each element that is wood; 0 for leaves.
+    fn radii(&self) -> Vec<f32> {
+        let skeleton = &self.tree.skeleton;
+        let mean = |chain: u32| {
+            let nodes = &skeleton.chains[chain as usize].nodes;
+            let sum: f32 = nodes
+                .iter()
+                .map(|&n| skeleton.nodes[n as usize].radius)
+                .sum();
+            sum / nodes.len().max(1) as f32
+        };
+        self.elements
             .iter()
-            .flat_map(|&(e, _)| self.elements[e as usize].triangles.iter().copied());
-        scene_of_model(&self.tree.model, triangles)
+            .map(|e| e.chain.map_or(0.0, mean))
+            .collect()
+    }
+
+    /// The wood that the plan draws as geometry, its textures no finer than the level needs.
+    fn wood(&self, plan: &LevelPlan, height_px: f32) -> Scene {
+        let mut mesh = WoodMesh::default();
+        for &(element, choice) in &plan.tubes {
+            if let Some(chain) = self.elements[element as usize].chain {
+                self.wood.build_tube(chain, choice as usize, 1.0, &mut mesh);
+            }
+        }
+        let mut scene = scene_of_wood(&self.tree.model, &mesh);
+        let most = (height_px as u32).next_power_of_two().clamp(64, 2048);
+        for image in &mut scene.images {
+            shrink(image, most);
+        }
+        scene
     }
 }
 

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use crate::botany::{load, recognise};
 use crate::detail::element::elements;
 use crate::detail::merge::merge;
+use crate::detail::wood::Wood;
 use crate::error::{Error, Result};
 use crate::export::gltf::write_glb;
 use crate::export::original::Original;
@@ -52,6 +53,7 @@ pub fn bake(request: &Request) -> Result<()> {
     let tree = recognise::recognise(model, &Default::default())?;
     let elements = elements(&tree);
     let hierarchy = merge(&elements, request.recipe.locality);
+    let wood = Wood::new(&tree, false);
     let original = Original::new(&tree.model, request.recipe.training_views, MASK_HEIGHT);
     std::fs::create_dir_all(&request.output)
         .map_err(|e| Error::io(&request.output, "create", e))?;
@@ -64,12 +66,17 @@ pub fn bake(request: &Request) -> Result<()> {
             tree: &tree,
             elements: &elements,
             hierarchy: &hierarchy,
+            wood: &wood,
             original: &original,
             recipe: &request.recipe,
         };
         let made = baker.level(LevelRequest {
             triangles: limit.triangles(all),
-            height_px: 256.0,
+            height_px: if limit.triangles(all) <= 24 {
+                64.0
+            } else {
+                256.0
+            },
             end_px: 128.0,
         });
         let (scene, matched) = (made.scene, made.matched);

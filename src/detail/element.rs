@@ -49,7 +49,13 @@ pub fn elements(tree: &Tree) -> Vec<Element> {
         if !triangles.is_empty() {
             let subtree = subtree_of_chain[chain];
             let chain = Some(chain as u32);
-            out.push(element(&tree.model, triangles, &opacity, chain, subtree));
+            let mut wood = element(&tree.model, triangles, &opacity, chain, subtree);
+            // A tube of surface S covers S/4 in the mean over all directions, as a leaf of
+            // one-sided area S/2 does (Cauchy): wood and leaves then weigh alike.
+            wood.moments.weight *= 0.5;
+            wood.moments.scatter *= 0.5;
+            wood.area *= 0.5;
+            out.push(wood);
         }
     }
     out

@@ -5,4 +5,5 @@ pub mod level;
 pub mod merge;
 pub mod optimal_cut;
 pub mod reassign;
+pub mod whole_tree;
 pub mod wood;

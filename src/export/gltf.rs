@@ -9,6 +9,7 @@ use glam::{Vec2, Vec3};
 use serde_json::{Map, Value, json};
 
 use crate::botany::model::{AlphaMode, Frame, Image, Material, Model, TextureRef, Wrap};
+use crate::detail::wood::WoodMesh;
 use crate::error::{Error, Result};
 use crate::space::glb::GlbBuilder;
 
@@ -72,6 +73,52 @@ pub fn scene_of_model(model: &Model, triangles: impl Iterator<Item = u32>) -> Sc
         let mut surface = gather(model, &triangles);
         surface.material = scene.materials.len() as u32;
         surface.name = copy.name.clone();
+        scene.materials.push(copy);
+        scene.surfaces.push(surface);
+    }
+    let mut order: Vec<(u32, u32)> = images.into_iter().map(|(from, to)| (to, from)).collect();
+    order.sort_unstable();
+    scene.images = order
+        .iter()
+        .map(|&(_, from)| model.images[from as usize].clone())
+        .collect();
+    scene
+}
+
+/// Simplified wood as surfaces, one for each material of the model that it uses.
+pub fn scene_of_wood(model: &Model, mesh: &WoodMesh) -> Scene {
+    let mut by_material: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+    for (t, &material) in mesh.triangle_material.iter().enumerate() {
+        by_material.entry(material).or_default().push(t as u32);
+    }
+    let mut scene = Scene::default();
+    let mut images: BTreeMap<u32, u32> = BTreeMap::new();
+    for (material, triangles) in by_material {
+        let mut copy = model.materials[material as usize].clone();
+        for texture in textures_of(&mut copy).into_iter().flatten() {
+            let next = images.len() as u32;
+            texture.image = *images.entry(texture.image).or_insert(next);
+            // Tubes carry the one set of coordinates that the base colour uses.
+            texture.uv_set = 0;
+        }
+        let mut surface = Surface {
+            name: "wood".into(),
+            material: scene.materials.len() as u32,
+            ..Surface::default()
+        };
+        let mut index = vec![u32::MAX; mesh.positions.len()];
+        for t in triangles {
+            surface.triangles.push(mesh.triangles[t as usize].map(|i| {
+                let at = i as usize;
+                if index[at] == u32::MAX {
+                    index[at] = surface.positions.len() as u32;
+                    surface.positions.push(mesh.positions[at]);
+                    surface.normals.push(mesh.normals[at]);
+                    surface.uvs[0].push(mesh.uvs[at]);
+                }
+                index[at]
+            }));
+        }
         scene.materials.push(copy);
         scene.surfaces.push(surface);
     }

@@ -43,6 +43,9 @@ const NEAR: Sampling = Sampling {
     mips: Mips::Base,
 };
 
+/// Times that threshold and floor are found in turn.
+const ROUNDS: u32 = 3;
+
 /// Highest floor: under the cutoff of 128 with room for rounding in mips.
 const HIGHEST_FLOOR: u8 = 120;
 
@@ -62,36 +65,18 @@ pub fn match_area(
     if foliage.charts.is_empty() {
         return found;
     }
-    for _ in 0..2 {
-        let (mut low, mut high) = (-0.6f32, 1.4f32);
-        for _ in 0..9 {
-            found.threshold = (low + high) / 2.0;
-            apply(foliage, score, found);
-            let ratio = level.area(foliage, &goal.near, NEAR) / goal.near_area.max(1e-9);
-            found.near_ratio = ratio;
-            if ratio > 1.0 {
-                low = found.threshold
-            } else {
-                high = found.threshold
-            }
+    // Each number moves the other's area a little; the threshold has the last word, because what
+    // is near is seen best.
+    for round in 0..ROUNDS {
+        if round > 0 {
+            found.floor = level.floor(foliage, score, found, goal);
         }
-        let (mut low, mut high) = (0u8, HIGHEST_FLOOR);
-        while low < high {
-            found.floor = low + (high - low) / 2;
-            apply(foliage, score, found);
-            let area = level.area(foliage, &goal.far, Sampling::CLIENT);
-            if area < goal.far_area {
-                low = found.floor + 1
-            } else {
-                high = found.floor
-            }
-        }
-        found.floor = low;
-        apply(foliage, score, found);
-        found.far_ratio =
-            level.area(foliage, &goal.far, Sampling::CLIENT) / goal.far_area.max(1e-9);
+        found.threshold = level.threshold(foliage, score, found, goal);
     }
+    apply(foliage, score, found);
     found.near_ratio = level.area(foliage, &goal.near, NEAR) / goal.near_area.max(1e-9);
+    let far = level.area(foliage, &goal.far, Sampling::CLIENT);
+    found.far_ratio = far / goal.far_area.max(1e-9);
     found
 }
 
@@ -137,6 +122,48 @@ impl LevelScene {
             materials,
             textures: [Texture::from_alpha(w, h, foliage.alpha.clone())],
         }
+    }
+
+    /// The threshold at which the near area is the original's, by bisection.
+    fn threshold(
+        &mut self,
+        foliage: &mut Foliage,
+        score: &[f32],
+        mut found: Matched,
+        goal: &AreaGoal,
+    ) -> f32 {
+        let (mut low, mut high) = (-0.6f32, 1.6f32);
+        for _ in 0..9 {
+            found.threshold = (low + high) / 2.0;
+            apply(foliage, score, found);
+            if self.area(foliage, &goal.near, NEAR) > goal.near_area {
+                low = found.threshold;
+            } else {
+                high = found.threshold;
+            }
+        }
+        (low + high) / 2.0
+    }
+
+    /// The least floor at which the far area is the original's, by bisection.
+    fn floor(
+        &mut self,
+        foliage: &mut Foliage,
+        score: &[f32],
+        mut found: Matched,
+        goal: &AreaGoal,
+    ) -> u8 {
+        let (mut low, mut high) = (0u8, HIGHEST_FLOOR);
+        while low < high {
+            found.floor = low + (high - low) / 2;
+            apply(foliage, score, found);
+            if self.area(foliage, &goal.far, Sampling::CLIENT) < goal.far_area {
+                low = found.floor + 1;
+            } else {
+                high = found.floor;
+            }
+        }
+        low
     }
 
     fn area(&mut self, foliage: &Foliage, cameras: &[Camera], sampling: Sampling) -> f64 {

@@ -6,6 +6,7 @@ pub mod edge;
 pub mod foliage;
 pub mod gltf;
 pub mod matching;
+pub mod mip;
 pub mod original;
 pub mod project;
 pub mod refine;
