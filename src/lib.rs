@@ -17,10 +17,12 @@ pub mod cloud;
 pub mod detail;
 pub mod error;
 pub mod export;
+pub mod knobs;
 pub mod level;
 pub mod pipeline;
 pub mod recipe;
 pub mod report;
+pub mod scene;
 pub mod space;
 
 pub use error::{Error, Result};

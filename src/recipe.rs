@@ -2,6 +2,20 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::knobs::{Knobs, Range};
+
+/// Where a recipe starts from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum Preset {
+    /// A quick look: fewer samples, views and rounds.
+    Draft,
+    /// Accuracy that is worth its time.
+    #[default]
+    Balanced,
+    /// The last percent, whatever it takes.
+    Best,
+}
+
 /// How a tree is baked. Read from RON; keys that are left out keep the preset's value.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -31,7 +45,60 @@ impl Default for Recipe {
     }
 }
 
+impl Knobs for Recipe {
+    const KIND: &'static str = "recipe";
+
+    fn ranges(&self) -> Vec<Range> {
+        let range = |key, value, least, most| Range {
+            key,
+            value,
+            least,
+            most,
+        };
+        vec![
+            range("locality", self.locality, 0.0, 1.0),
+            range("reassign_rounds", self.reassign_rounds.into(), 0.0, 100.0),
+            range("texel_density", self.texel_density.into(), 0.25, 4.0),
+            range("gutter_texels", self.gutter_texels.into(), 0.0, 16.0),
+            range("samples", self.samples.into(), 1.0, 8.0),
+            range("refine_rounds", self.refine_rounds.into(), 0.0, 100.0),
+            range("training_views", self.training_views.into(), 4.0, 64.0),
+        ]
+    }
+}
+
 impl Recipe {
+    /// The recipe of a preset.
+    pub fn preset(preset: Preset) -> Self {
+        match preset {
+            Preset::Draft => Self::draft(),
+            Preset::Balanced => Self::balanced(),
+            Preset::Best => Self::best(),
+        }
+    }
+
+    /// A quick look.
+    pub fn draft() -> Self {
+        Self {
+            reassign_rounds: 4,
+            samples: 2,
+            refine_rounds: 2,
+            training_views: 12,
+            ..Self::balanced()
+        }
+    }
+
+    /// The last percent.
+    pub fn best() -> Self {
+        Self {
+            reassign_rounds: 30,
+            samples: 6,
+            refine_rounds: 12,
+            training_views: 48,
+            ..Self::balanced()
+        }
+    }
+
     /// The default: accuracy that is worth its time.
     pub fn balanced() -> Self {
         Self {

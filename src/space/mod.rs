@@ -8,5 +8,6 @@ pub mod hull;
 mod min_triangle;
 pub mod polyline;
 pub mod raster;
+pub mod sha256;
 pub mod texture;
 pub mod view;

@@ -1,0 +1,211 @@
+//! The manifest of a package: what was baked from what, and what an engine needs to choose levels.
+//!
+//! RON, one card or sub-tree a line. All positions and lengths are in the world of the glTF files
+//! (metres by the glTF specification), unless a name says otherwise. [`VERSION`] grows when a
+//! reader of the old form would misread the new one; keys may be added without.
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use crate::error::{Error, Result};
+use crate::recipe::Recipe;
+use crate::scene::Scene;
+
+/// What a manifest's name ends with.
+pub const SUFFIX: &str = ".pleach.ron";
+/// What [`Manifest::format`] says.
+pub const FORMAT: &str = "pleach";
+/// Version of this form.
+pub const VERSION: u32 = 1;
+
+/// The whole manifest.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Manifest {
+    /// [`FORMAT`].
+    pub format: String,
+    /// [`VERSION`].
+    pub version: u32,
+    /// What it was made from, and by what.
+    pub provenance: Provenance,
+    /// All files of the package, this one last.
+    pub files: Vec<String>,
+    /// The knobs, all of them.
+    pub recipe: Recipe,
+    /// The screen that distances are stated for.
+    pub scene: Scene,
+    /// The original.
+    pub tree: Original,
+    /// The levels, nearest first; level 0 is the original.
+    pub levels: Vec<Level>,
+    /// The hierarchy of sub-trees: parents before children; 0 is the whole tree.
+    pub subtrees: Vec<Subtree>,
+}
+
+/// What a package was made from.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Provenance {
+    /// "pleach" and its version.
+    pub generator: String,
+    /// Name of the input file, without its folder.
+    pub input: String,
+    /// Bytes of the input file.
+    pub input_bytes: u64,
+    /// SHA-256 of the input file (not of files that it refers to), hexadecimal.
+    pub input_sha256: String,
+}
+
+/// What the original is.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Original {
+    /// The input's stem, with which all file names start.
+    pub name: String,
+    /// Triangles.
+    pub triangles: u64,
+    /// Leaves that were recognised.
+    pub leaves: u64,
+    /// Extent along y.
+    pub height_m: f64,
+    /// Centre of the bounding sphere.
+    pub center: [f64; 3],
+    /// Radius of the bounding sphere.
+    pub radius_m: f64,
+    /// What was guessed or could not be had.
+    pub warnings: Vec<String>,
+}
+
+/// One level.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Level {
+    /// Number; 0 is the original.
+    pub level: u32,
+    /// The file that holds it alone.
+    pub file: String,
+    /// Triangles, wood included.
+    pub triangles: u64,
+    /// From where, and until where, it is shown.
+    pub range: Range,
+    /// Root of the area-weighted mean squared distance between what is drawn and the original;
+    /// in whole-tree levels, too.
+    pub error_m: f64,
+    /// The same in pixels where the level starts.
+    pub error_px: f64,
+    /// Width and height of its atlas, texels; (0, 0) without one.
+    pub atlas: [u32; 2],
+    /// Triangles of wood that is drawn as geometry.
+    pub wood_triangles: u64,
+    /// Its billboards.
+    pub cards: Vec<Card>,
+}
+
+/// Where a level is shown.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Range {
+    /// From this distance on.
+    pub distance_m: f64,
+    /// Up to this distance; the last level's is infinite, or where the tree vanishes.
+    pub end_m: f64,
+    /// Distances between which it fades in over the nearer level. Draw both in between; before
+    /// the first only the nearer one, after the second only this one. Zeros for level 0.
+    pub fade_m: [f64; 2],
+    /// Height of the tree over the screen's where the level starts; infinite for level 0.
+    pub screen_height: f64,
+    /// The same in pixels of [`Scene::screen_height_px`].
+    pub height_px: f64,
+    /// Share of the screen's area under which the level ends: the number of `MSFT_lod`.
+    pub screen_coverage: f64,
+}
+
+/// One billboard.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Card {
+    /// The smallest sub-tree that carries all that the card shows; levels may regroup leaves.
+    pub subtree: u32,
+    /// Corners, counter-clockwise seen from the front.
+    pub corners: Vec<[f32; 3]>,
+    /// Left, top, width, height in the atlas, texels. Two triangular cards may share one.
+    pub atlas: [u32; 4],
+    /// Triangles of the original that it shows.
+    pub shows: u32,
+    /// Root of the area-weighted mean squared distance from what it shows to the card.
+    pub error_m: f64,
+    /// `A`: surface area of the foliage that it shows, one side, square metres.
+    pub area_m2: f64,
+    /// `C`: foliage within a pixel of the card, minus what is farther off; square metres.
+    pub coverage_m2: f64,
+    /// `sigma`: how visible the place is from anywhere, 1 free, 0 hidden by leaves.
+    pub sigma: f64,
+    /// `sigma * C` as the paper prints it; cuts weigh `sigma * (A - C)`.
+    pub quality: f64,
+    /// Distance at which its texels have the size of pixels: `extent * focal_px / texels`.
+    pub optimal_distance_m: f64,
+}
+
+/// One sub-tree.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Subtree {
+    /// The sub-tree that carries it.
+    pub parent: Option<u32>,
+    /// Branch order: 0 for a trunk.
+    pub order: u32,
+    /// Where it is connected.
+    pub connector: [f32; 3],
+    /// Centre of its bounding sphere.
+    pub center: [f32; 3],
+    /// Radius of its bounding sphere.
+    pub radius_m: f32,
+    /// Leaves on it and all that it carries.
+    pub leaves: u32,
+}
+
+impl Manifest {
+    /// The text of the file.
+    ///
+    /// # Errors
+    /// [`Error::Internal`].
+    pub fn to_ron(&self) -> Result<String> {
+        let pretty = ron::ser::PrettyConfig::new()
+            .depth_limit(4)
+            .new_line("\n")
+            .indentor("  ");
+        let text = ron::ser::to_string_pretty(self, pretty).map_err(|e| Error::Internal {
+            step: "write manifest",
+            what: e.to_string(),
+        })?;
+        Ok(text + "\n")
+    }
+
+    /// Reads a manifest's text.
+    ///
+    /// # Errors
+    /// [`Error::Input`] with line and column, or where the version is unknown.
+    pub fn from_ron(text: &str, file: &Path) -> Result<Self> {
+        let fail =
+            |place: String, what: String| Error::input(file, place, what, "bake the package again");
+        let read: Self = ron::from_str(text).map_err(|e| {
+            let at = e.span.start;
+            fail(
+                format!("line {}, column {}", at.line, at.col),
+                e.code.to_string(),
+            )
+        })?;
+        if read.format != FORMAT || read.version != VERSION {
+            let what = format!("this is {:?} version {}", read.format, read.version);
+            return Err(fail("format".into(), what));
+        }
+        Ok(read)
+    }
+
+    /// The files that a manifest of any version lists; `None` where it is none of ours.
+    pub fn files_of(file: &Path) -> Option<Vec<String>> {
+        #[derive(Deserialize)]
+        struct Owned {
+            format: String,
+            files: Vec<String>,
+        }
+        let owned: Owned = ron::from_str(&std::fs::read_to_string(file).ok()?).ok()?;
+        // A name is a file in this folder, never a path out of it.
+        let plain = |n: &String| !n.contains(['/', '\\']) && n != "..";
+        (owned.format == FORMAT).then(|| owned.files.into_iter().filter(plain).collect())
+    }
+}

@@ -1,0 +1,130 @@
+//! Scene: how the tree is looked at, and so which levels are needed at which distances.
+
+use serde::{Deserialize, Serialize};
+
+use crate::knobs::{Knobs, Range};
+
+/// The screen that distances are stated for. Read from RON; keys that are left out keep the default.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Scene {
+    /// Lines of the screen, 64 to 16384; default 1080.
+    pub screen_height_px: u32,
+    /// Width of the screen over its height, 0.25 to 8; default 16:9. Screen coverage, an area,
+    /// needs it.
+    pub aspect: f64,
+    /// Vertical field of view, degrees, 1 to 170; default 60.
+    pub fov_deg: f64,
+    /// Height of the tree in pixels where the first level takes over from the original, 8 to
+    /// 16384; default 512. Each further level starts at half the height, so at twice the distance.
+    pub first_height_px: f64,
+    /// Heights in pixels where each level starts, falling; empty: by `first_height_px`.
+    pub heights_px: Vec<f64>,
+    /// Height in pixels under which nothing is drawn, 0 to 64; default 0: never.
+    pub vanish_height_px: f64,
+    /// Levels fade into each other between their distance and this many times that, 1 to 2;
+    /// default 1.1.
+    pub fade: f64,
+}
+
+impl Default for Scene {
+    fn default() -> Self {
+        Self {
+            screen_height_px: 1080,
+            aspect: 16.0 / 9.0,
+            fov_deg: 60.0,
+            first_height_px: 512.0,
+            heights_px: Vec::new(),
+            vanish_height_px: 0.0,
+            fade: 1.1,
+        }
+    }
+}
+
+impl Knobs for Scene {
+    const KIND: &'static str = "scene";
+
+    fn ranges(&self) -> Vec<Range> {
+        let range = |key, value, least, most| Range {
+            key,
+            value,
+            least,
+            most,
+        };
+        let mut out = vec![
+            range(
+                "screen_height_px",
+                self.screen_height_px.into(),
+                64.0,
+                16384.0,
+            ),
+            range("aspect", self.aspect, 0.25, 8.0),
+            range("fov_deg", self.fov_deg, 1.0, 170.0),
+            range("first_height_px", self.first_height_px, 8.0, 16384.0),
+            range("vanish_height_px", self.vanish_height_px, 0.0, 64.0),
+            range("fade", self.fade, 1.0, 2.0),
+        ];
+        let mut nearer = 16384.0;
+        for &height in &self.heights_px {
+            out.push(range("heights_px", height, 4.0, nearer));
+            nearer = height / 1.01;
+        }
+        out
+    }
+}
+
+impl Scene {
+    /// Distance at which something `height` units high is `height_px` pixels high, in its unit:
+    /// `d = H / (2 s tan(fov / 2))` with the share `s` of the screen's height.
+    pub fn distance(&self, height: f64, height_px: f64) -> f64 {
+        let share = height_px / f64::from(self.screen_height_px);
+        height / (2.0 * share * (self.fov_deg / 2.0).to_radians().tan())
+    }
+
+    /// Focal length in pixels: a unit at distance `d` is `focal_px / d` pixels high.
+    pub fn focal_px(&self) -> f64 {
+        f64::from(self.screen_height_px) / (2.0 * (self.fov_deg / 2.0).to_radians().tan())
+    }
+
+    /// Share of the screen's area that a tree takes which is `height_px` pixels high and
+    /// `width_to_height` times as wide, at most 1.
+    pub fn screen_coverage(&self, height_px: f64, width_to_height: f64) -> f64 {
+        let share = height_px / f64::from(self.screen_height_px);
+        (share * share * width_to_height / self.aspect).min(1.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn distances_worked_by_hand() {
+        // 90 degrees: at distance d the screen shows 2 d; half of it is d.
+        let scene = Scene {
+            fov_deg: 90.0,
+            screen_height_px: 1000,
+            ..Scene::default()
+        };
+        assert!((scene.distance(10.0, 500.0) - 10.0).abs() < 1e-12);
+        assert!((scene.distance(10.0, 250.0) - 20.0).abs() < 1e-12);
+        assert!((scene.focal_px() - 500.0).abs() < 1e-9);
+        // Half as high as the screen and as wide as high on a 2:1 screen: an eighth.
+        let scene = Scene {
+            aspect: 2.0,
+            ..scene
+        };
+        assert!((scene.screen_coverage(500.0, 1.0) - 0.125).abs() < 1e-12);
+        assert_eq!(scene.screen_coverage(5000.0, 1.0), 1.0);
+    }
+
+    #[test]
+    fn heights_must_fall() {
+        let scene = |heights_px| Scene {
+            heights_px,
+            ..Scene::default()
+        };
+        assert!(crate::knobs::check(&scene(vec![512.0, 256.0])).is_ok());
+        assert!(crate::knobs::check(&scene(vec![256.0, 256.0])).is_err());
+    }
+}
