@@ -129,6 +129,15 @@ impl<'a> Asset<'a> {
         .map(Some)
     }
 
+    /// Number of an accessor's elements, which are all there: what may be allocated for them.
+    pub fn count(&self, index: usize, place: &str) -> Result<usize> {
+        let accessor = self.accessor(index, place)?;
+        let component = component_size(accessor.component_type).unwrap_or(1);
+        let size = component * self.components(index, place)?;
+        self.base(index, size, place)?;
+        Ok(accessor.count)
+    }
+
     /// Positions at which a sparse accessor replaces elements: ascending, in range.
     fn sparse_positions(&self, index: usize, place: &str) -> Result<Vec<u32>> {
         let accessor = self.accessor(index, place)?;

@@ -82,7 +82,7 @@ impl Reader<'_> {
             warnings.say("a primitive without POSITION is skipped", &self.place);
             return Ok(None);
         };
-        let vertex_count = self.asset.accessor(position, &self.place)?.count;
+        let vertex_count = self.asset.count(position, &self.at("POSITION"))?;
 
         // 1. Triangles, by the file's vertex numbers.
         let flat = self.flat_indices(position, vertex_count, indices_left)?;
@@ -157,7 +157,7 @@ impl Reader<'_> {
         let accessor = self.primitive.indices;
         let count = match accessor {
             None => vertex_count,
-            Some(a) => self.asset.accessor(a, &self.place)?.count,
+            Some(a) => self.asset.count(a, &self.at("indices"))?,
         };
         if count > *indices_left || vertex_count > u32::MAX as usize {
             let most = self.asset.limits.triangles;

@@ -169,7 +169,7 @@ fn instances(
 ) -> Result<Vec<DMat4>> {
     let mut count = None;
     for (name, &accessor) in attributes {
-        let n = asset.accessor(accessor, place)?.count;
+        let n = asset.count(accessor, place)?;
         if *count.get_or_insert(n) != n {
             let what = format!("instance attribute {name} has {n} elements, others differ");
             return Err(asset.fault(place, what, BROKEN));
