@@ -274,3 +274,50 @@ fn missing_coordinates_and_colours_are_filled() {
     assert_eq!(model.colors[3..], [[0.5, 0.5, 0.5, 1.0]; 3]);
     assert!(model.warnings[0].contains("no texture coordinates"));
 }
+
+#[test]
+fn palettes_grey_and_16_bit_images_become_straight_rgba() {
+    let encode = |color, depth, data: &[u8]| {
+        let mut out = Vec::new();
+        let mut encoder = png::Encoder::new(&mut out, 2, 1);
+        encoder.set_color(color);
+        encoder.set_depth(depth);
+        if color == png::ColorType::Indexed {
+            encoder.set_palette(vec![10, 20, 30, 40, 50, 60]);
+            encoder.set_trns(vec![255, 0]);
+        }
+        encoder
+            .write_header()
+            .unwrap()
+            .write_image_data(data)
+            .unwrap();
+        out
+    };
+    let cases = [
+        (
+            encode(png::ColorType::Indexed, png::BitDepth::Eight, &[1, 0]),
+            [40, 50, 60, 0, 10, 20, 30, 255],
+        ),
+        (
+            encode(
+                png::ColorType::Grayscale,
+                png::BitDepth::One,
+                &[0b0100_0000],
+            ),
+            [0, 0, 0, 255, 255, 255, 255, 255],
+        ),
+        (
+            encode(
+                png::ColorType::GrayscaleAlpha,
+                png::BitDepth::Sixteen,
+                &[255, 255, 0, 0, 0, 0, 255, 255],
+            ),
+            [255, 255, 255, 0, 0, 0, 0, 255],
+        ),
+    ];
+    for (bytes, want) in cases {
+        let material = json!({ "pbrMetallicRoughness": { "baseColorTexture": { "index": 0 } } });
+        let model = textured(material, &[&bytes]).load().unwrap();
+        assert_eq!(model.images[0].rgba, want);
+    }
+}
