@@ -140,14 +140,21 @@ impl Camera {
                 return Corner::OUTSIDE;
             }
             Corner {
-                x: x.round() as i32,
-                y: y.round() as i32,
+                x: nearest(x),
+                y: nearest(y),
                 near,
                 q,
             }
         };
         points.iter().map(project).collect()
     }
+}
+
+/// Rounds half up; `round` is a call into the C library on plain x86-64.
+fn nearest(value: f32) -> i32 {
+    let value = value + 0.5;
+    let whole = value as i32;
+    whole - (whole as f32 > value) as i32
 }
 
 /// Corners are snapped to this part of a sample, as graphics processors do (8 bits).

@@ -1,7 +1,7 @@
 //! Which samples a scene hits: alpha without colour or depth, the fast path.
 
 use super::camera::Corner;
-use super::draw::Fragment;
+use super::fragment::Fragment;
 use super::triangle::Triangle;
 use super::{Camera, Sampling, Scene};
 
@@ -70,11 +70,7 @@ pub fn coverage_with_stats(scene: &Scene, camera: &Camera, sampling: Sampling) -
             let fragment = fragment.get_or_insert_with(|| {
                 Fragment::new(scene, material, indices, &at, &triangle, sampling)
             });
-            for (sample, x) in row.iter_mut().zip(from..) {
-                if *sample == 0 && fragment.passes(x, y) {
-                    *sample = 1;
-                }
-            }
+            fragment.test_row(y, from, row);
         });
     }
     let mask = Mask {

@@ -16,7 +16,9 @@
 mod camera;
 mod coverage;
 mod draw;
+mod fragment;
 mod image;
+mod mips;
 mod shade;
 mod texture;
 mod triangle;

@@ -2,7 +2,8 @@
 
 use glam::Vec3;
 
-use super::draw::{EMPTY, Fragment, Items};
+use super::draw::{EMPTY, Items};
+use super::fragment::Fragment;
 use super::image::Picture;
 use super::triangle::{Plane, Triangle};
 use super::{Camera, Sampling, Scene};

@@ -4,9 +4,7 @@
 //! (decoded from sRGB, not weighted by alpha), alpha as it is. Alpha lies in planes of its own, so
 //! that it can be replaced and drawn without touching colours.
 
-use std::sync::LazyLock;
-
-use super::shade::{linear_from_srgb, srgb_from_linear};
+use super::mips;
 
 /// A sampler's wrap mode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -27,12 +25,12 @@ pub struct Texture {
 }
 
 #[derive(Clone, Debug)]
-struct Level {
-    width: u32,
-    height: u32,
-    alpha: Vec<u8>,
+pub(super) struct Level {
+    pub width: u32,
+    pub height: u32,
+    pub alpha: Vec<u8>,
     /// sRGB; empty where only alpha is wanted.
-    rgb: Vec<[u8; 3]>,
+    pub rgb: Vec<[u8; 3]>,
 }
 
 impl Texture {
@@ -68,7 +66,7 @@ impl Texture {
         while let Some(finer) = levels.last()
             && (finer.width > 1 || finer.height > 1)
         {
-            levels.push(finer.halved());
+            levels.push(mips::halved(finer));
         }
         Self { levels }
     }
@@ -83,7 +81,7 @@ impl Texture {
         for i in 1..self.levels.len() {
             let (finer, rest) = self.levels.split_at_mut(i);
             let (finer, coarser) = (&finer[i - 1], &mut rest[0]);
-            halve_alpha(finer, coarser.width, coarser.height, &mut coarser.alpha);
+            mips::halve_alpha(finer, coarser.width, coarser.height, &mut coarser.alpha);
         }
     }
 
@@ -103,144 +101,119 @@ impl Texture {
         (level.width, level.height, &level.alpha)
     }
 
-    /// Alpha (0 to 1) at `uv`, `lod` levels above the base, between levels where it is fractional.
-    pub(super) fn alpha(&self, uv: [f32; 2], lod: f32, wrap: [Wrap; 2], linear: bool) -> f32 {
-        self.blend(lod, |level| {
-            if linear {
-                level.bilinear(uv, wrap, |i| level.alpha[i] as f32)
-            } else {
-                level.alpha[level.nearest(uv, wrap)] as f32
-            }
-        }) / 255.0
+    /// The levels that a level of detail lies between, 0 being the base.
+    pub(super) fn mip(&self, lod: f32) -> Mip<'_> {
+        let last = self.levels.len() - 1;
+        let low = (lod.max(0.0) as usize).min(last);
+        let part = if low == last {
+            0.0
+        } else {
+            lod.max(0.0) - low as f32
+        };
+        Mip {
+            finer: &self.levels[low],
+            coarser: (part > 0.0).then(|| (&self.levels[low + 1], part)),
+        }
+    }
+}
+
+/// How a texture is read.
+#[derive(Clone, Copy)]
+pub(super) struct Address {
+    pub wrap: [Wrap; 2],
+    /// False: the nearest texel.
+    pub linear: bool,
+}
+
+/// A texture at one level of detail.
+#[derive(Clone, Copy)]
+pub(super) struct Mip<'a> {
+    finer: &'a Level,
+    /// The next level and its weight.
+    coarser: Option<(&'a Level, f32)>,
+}
+
+impl Mip<'_> {
+    /// Alpha (0 to 1) at `uv`.
+    pub fn alpha(&self, uv: [f32; 2], address: Address) -> f32 {
+        let fine = self.finer.alpha_at(uv, address);
+        let fixed = match self.coarser {
+            None => fine,
+            Some((level, part)) => fine + (level.alpha_at(uv, address) - fine) * part,
+        };
+        fixed * (1.0 / (255.0 * 65_536.0))
     }
 
     /// Linear RGB at `uv`; white where the texture has alpha alone.
-    pub(super) fn rgb(&self, uv: [f32; 2], lod: f32, wrap: [Wrap; 2], linear: bool) -> [f32; 3] {
-        if self.levels[0].rgb.is_empty() {
-            return [1.0; 3];
+    pub fn rgb(&self, uv: [f32; 2], address: Address) -> [f32; 3] {
+        let fine = self.finer.rgb_at(uv, address);
+        match self.coarser {
+            None => fine,
+            Some((level, part)) => {
+                let coarse = level.rgb_at(uv, address);
+                std::array::from_fn(|i| fine[i] + (coarse[i] - fine[i]) * part)
+            }
         }
-        let decode = &*DECODE;
-        std::array::from_fn(|channel| {
-            self.blend(lod, |level| {
-                if linear {
-                    level.bilinear(uv, wrap, |i| decode[level.rgb[i][channel] as usize])
-                } else {
-                    decode[level.rgb[level.nearest(uv, wrap)][channel] as usize]
-                }
-            })
-        })
-    }
-
-    fn blend(&self, lod: f32, value: impl Fn(&Level) -> f32) -> f32 {
-        let last = self.levels.len() - 1;
-        if lod <= 0.0 {
-            return value(&self.levels[0]);
-        }
-        let low = lod as usize;
-        if low >= last {
-            return value(&self.levels[last]);
-        }
-        let part = lod - low as f32;
-        let near = value(&self.levels[low]);
-        if part == 0.0 {
-            return near;
-        }
-        near + (value(&self.levels[low + 1]) - near) * part
     }
 }
-
-/// Linear light of an sRGB byte.
-static DECODE: LazyLock<[f32; 256]> =
-    LazyLock::new(|| std::array::from_fn(|i| linear_from_srgb(i as f32 / 255.0)));
-
-/// sRGB byte of linear light in 4096 steps of its square root (fine where sRGB is steep).
-static ENCODE: LazyLock<Vec<u8>> = LazyLock::new(|| {
-    let encode = |i: usize| {
-        let root = i as f32 / 4095.0;
-        (srgb_from_linear(root * root) * 255.0 + 0.5) as u8
-    };
-    (0..4096).map(encode).collect()
-});
 
 impl Level {
-    fn halved(&self) -> Self {
-        let (width, height) = ((self.width / 2).max(1), (self.height / 2).max(1));
-        let count = width as usize * height as usize;
-        let mut alpha = vec![0; count];
-        halve_alpha(self, width, height, &mut alpha);
-        let mut rgb = Vec::new();
-        if !self.rgb.is_empty() {
-            let (decode, encode) = (&*DECODE, &*ENCODE);
-            rgb.reserve_exact(count);
-            for_each_box(self, width, height, |indices| {
-                rgb.push(std::array::from_fn(|channel| {
-                    let sum: f32 = indices
-                        .iter()
-                        .map(|&i| decode[self.rgb[i][channel] as usize])
-                        .sum();
-                    let mean = sum / indices.len() as f32;
-                    encode[(mean.sqrt() * 4095.0 + 0.5) as usize]
-                }));
-            });
+    /// The four texels around `uv` (left above, right above, left below, right below) and the
+    /// weights of the right and lower ones in 256ths, the grain of graphics processors.
+    #[inline]
+    fn around(&self, [u, v]: [f32; 2], address: Address) -> ([usize; 4], [u32; 2]) {
+        let (mut x, mut y) = (fixed(u, self.width), fixed(v, self.height));
+        if !address.linear {
+            // To the middle of the texel that holds the point: its neighbours weigh nothing.
+            (x, y) = ((x + 128) & !255, (y + 128) & !255);
         }
-        Self {
-            width,
-            height,
-            alpha,
-            rgb,
+        let weights = [(x & 255) as u32, (y & 255) as u32];
+        let (x, y, width) = (x >> 8, y >> 8, self.width as usize);
+        // Nearly every sample lies inside the image, and divisions are dear.
+        if x >= 0 && y >= 0 && x + 1 < self.width as i32 && y + 1 < self.height as i32 {
+            let at = y as usize * width + x as usize;
+            return ([at, at + 1, at + width, at + width + 1], weights);
         }
+        let [left, right] = [x, x + 1].map(|x| address.wrap[0].apply(x, self.width));
+        let [above, below] = [y, y + 1].map(|y| address.wrap[1].apply(y, self.height) * width);
+        let texels = [above + left, above + right, below + left, below + right];
+        (texels, weights)
     }
 
-    fn nearest(&self, [u, v]: [f32; 2], wrap: [Wrap; 2]) -> usize {
-        let x = wrap[0].apply((u * self.width as f32).floor() as i32, self.width);
-        let y = wrap[1].apply((v * self.height as f32).floor() as i32, self.height);
-        y * self.width as usize + x
+    /// Alpha in units of 1 / (255 * 65536), exact in 24 bits.
+    #[inline]
+    fn alpha_at(&self, uv: [f32; 2], address: Address) -> f32 {
+        let (texels, [right, below]) = self.around(uv, address);
+        let [a, b, c, d] = texels.map(|i| self.alpha[i] as u32);
+        let top = a * (256 - right) + b * right;
+        let bottom = c * (256 - right) + d * right;
+        (top * (256 - below) + bottom * below) as f32
     }
 
-    fn bilinear(&self, [u, v]: [f32; 2], wrap: [Wrap; 2], texel: impl Fn(usize) -> f32) -> f32 {
-        let (x, y) = (u * self.width as f32 - 0.5, v * self.height as f32 - 0.5);
-        let (low_x, low_y) = (x.floor(), y.floor());
-        let (part_x, part_y) = (x - low_x, y - low_y);
-        let [left, right] = wrap[0].pair(low_x as i32, self.width);
-        let [above, below] = wrap[1].pair(low_y as i32, self.height);
-        let (above, below) = (above * self.width as usize, below * self.width as usize);
-        let (a, b) = (texel(above + left), texel(above + right));
-        let (c, d) = (texel(below + left), texel(below + right));
-        let (top, bottom) = (a + (b - a) * part_x, c + (d - c) * part_x);
-        top + (bottom - top) * part_y
+    fn rgb_at(&self, uv: [f32; 2], address: Address) -> [f32; 3] {
+        if self.rgb.is_empty() {
+            return [1.0; 3];
+        }
+        let (texels, [right, below]) = self.around(uv, address);
+        let (right, below) = (right as f32 / 256.0, below as f32 / 256.0);
+        let texels = texels.map(|i| self.rgb[i]);
+        std::array::from_fn(|channel| {
+            let [a, b, c, d] = texels.map(|t| mips::light(t[channel]));
+            let (top, bottom) = (a + (b - a) * right, c + (d - c) * right);
+            top + (bottom - top) * below
+        })
     }
 }
 
-fn halve_alpha(finer: &Level, width: u32, height: u32, out: &mut [u8]) {
-    let mut out = out.iter_mut();
-    for_each_box(finer, width, height, |indices| {
-        let sum: u32 = indices.iter().map(|&i| finer.alpha[i] as u32).sum();
-        let count = indices.len() as u32;
-        if let Some(out) = out.next() {
-            *out = ((sum + count / 2) / count) as u8;
-        }
-    });
-}
-
-/// The texels of the finer level under each texel of the coarser one, row by row. An odd edge
-/// loses its last texel to the box beside it (three texels instead of two).
-fn for_each_box(finer: &Level, width: u32, height: u32, mut each: impl FnMut(&[usize])) {
-    let mut indices = Vec::with_capacity(9);
-    let range = |i: u32, coarse: u32, fine: u32| {
-        let from = (i * 2).min(fine - 1);
-        let to = if i + 1 == coarse { fine } else { i * 2 + 2 };
-        from..to
-    };
-    for y in 0..height {
-        for x in 0..width {
-            indices.clear();
-            for fine_y in range(y, height, finer.height) {
-                let row = fine_y as usize * finer.width as usize;
-                indices.extend(range(x, width, finer.width).map(|fine_x| row + fine_x as usize));
-            }
-            each(&indices);
-        }
-    }
+/// Where a coordinate lies between texel centres, in 256ths of a texel, rounded down.
+///
+/// `floor` is a call into the C library on plain x86-64, and takes longer than all the rest.
+#[inline]
+fn fixed(coordinate: f32, size: u32) -> i32 {
+    let position = (coordinate * size as f32 - 0.5) * 256.0;
+    // Kept far from the ends of i32: neighbours of any texel can be counted.
+    let whole = position.clamp(-1e9, 1e9) as i32;
+    whole - (whole as f32 > position) as i32
 }
 
 impl Wrap {
@@ -255,14 +228,5 @@ impl Wrap {
             }
         };
         wrapped as usize
-    }
-
-    fn pair(self, i: i32, size: u32) -> [usize; 2] {
-        // Nearly every sample lies inside the image, and divisions are dear.
-        if i >= 0 && i + 1 < size as i32 {
-            [i as usize, i as usize + 1]
-        } else {
-            [self.apply(i, size), self.apply(i.saturating_add(1), size)]
-        }
     }
 }

@@ -31,7 +31,30 @@ pub(super) struct Plane {
 
 impl Plane {
     pub fn value(&self, x: i32, y: i32) -> f32 {
-        self.at + self.dx * (x as f32 - self.x0) + self.dy * (y as f32 - self.y0)
+        self.row(y).value(x)
+    }
+
+    /// The values of a row.
+    pub fn row(&self, y: i32) -> Row {
+        Row {
+            at: self.at + self.dy * (y as f32 - self.y0),
+            dx: self.dx,
+            x0: self.x0,
+        }
+    }
+}
+
+/// A [`Plane`] along one row of samples.
+#[derive(Clone, Copy)]
+pub(super) struct Row {
+    at: f32,
+    dx: f32,
+    x0: f32,
+}
+
+impl Row {
+    pub fn value(&self, x: i32) -> f32 {
+        self.at + self.dx * (x as f32 - self.x0)
     }
 }
 

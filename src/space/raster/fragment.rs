@@ -1,0 +1,157 @@
+//! What the material of one triangle gives at its samples: alpha test and base colour.
+
+use super::camera::Corner;
+use super::texture::{Address, Texture};
+use super::triangle::{Plane, Triangle};
+use super::{Material, Mips, Sampling, Scene};
+
+/// What the texture of one triangle gives at its samples.
+pub(super) struct Fragment<'a> {
+    texture: Option<&'a Texture>,
+    material: &'a Material,
+    u: Plane,
+    v: Plane,
+    q: Plane,
+    /// The level of the whole triangle, where lines of sight are parallel.
+    lod: Option<f32>,
+    mips: Mips,
+    /// Vertex alpha, where vertices have colours.
+    alpha: Option<Plane>,
+}
+
+impl<'a> Fragment<'a> {
+    pub fn new(
+        scene: &Scene<'a>,
+        material: &'a Material,
+        indices: &[u32; 3],
+        corners: &[Corner; 3],
+        triangle: &Triangle,
+        sampling: Sampling,
+    ) -> Self {
+        let uvs = scene.geometry.uvs[material.uv_set.min(1) as usize];
+        let texture = material
+            .texture
+            .filter(|_| !uvs.is_empty())
+            .map(|i| &scene.textures[i as usize]);
+        let q = corners.map(|c| c.q);
+        let flat = q == [1.0; 3];
+        let mut fragment = Self {
+            texture,
+            material,
+            u: Plane::default(),
+            v: Plane::default(),
+            q: triangle.plane(q),
+            lod: None,
+            mips: sampling.mips,
+            alpha: None,
+        };
+        if texture.is_some() {
+            let uv = indices.map(|i| uvs[i as usize]);
+            fragment.u = triangle.plane(std::array::from_fn(|i| uv[i].x * q[i]));
+            fragment.v = triangle.plane(std::array::from_fn(|i| uv[i].y * q[i]));
+            if flat || sampling.mips == Mips::Base {
+                fragment.lod = Some(fragment.level(0.0, 0.0, 1.0));
+            }
+        }
+        let colors = scene.geometry.colors;
+        if !colors.is_empty() {
+            let alpha = std::array::from_fn(|i| colors[indices[i] as usize][3] * q[i]);
+            fragment.alpha = Some(triangle.plane(alpha));
+        }
+        fragment
+    }
+
+    /// OpenGL's level of detail: the longer of a sample's two edges in texels, as a power of two.
+    fn level(&self, u: f32, v: f32, q: f32) -> f32 {
+        let (Some(texture), false) = (self.texture, self.mips == Mips::Base) else {
+            return 0.0;
+        };
+        let (width, height) = texture.size();
+        // Quotient rule: u = U/q, so du = (dU - u dq) / q.
+        let edge = |du: f32, dv: f32, dq: f32| {
+            let (s, t) = (
+                (du - u * dq) / q * width as f32,
+                (dv - v * dq) / q * height as f32,
+            );
+            s * s + t * t
+        };
+        let across = edge(self.u.dx, self.v.dx, self.q.dx);
+        let down = edge(self.u.dy, self.v.dy, self.q.dy);
+        let level = 0.5 * across.max(down).log2();
+        match self.mips {
+            Mips::Nearest => level.max(0.0).round(),
+            _ => level.max(0.0),
+        }
+    }
+
+    /// Whether nothing varies over the triangle but texture coordinates, and those linearly.
+    fn is_flat(&self) -> bool {
+        self.q.dx == 0.0 && self.q.dy == 0.0
+    }
+
+    /// Texture coordinates and level at a sample.
+    fn at(&self, x: i32, y: i32) -> ([f32; 2], f32) {
+        let (u, v) = (self.u.value(x, y), self.v.value(x, y));
+        let (u, v, q) = if self.is_flat() {
+            (u, v, 1.0)
+        } else {
+            let q = self.q.value(x, y);
+            (u / q, v / q, q)
+        };
+        ([u, v], self.lod.unwrap_or_else(|| self.level(u, v, q)))
+    }
+
+    fn address(&self) -> Address {
+        Address {
+            wrap: self.material.wrap,
+            linear: self.material.linear,
+        }
+    }
+
+    /// Alpha test of one sample.
+    pub fn passes(&self, x: i32, y: i32) -> bool {
+        let mut alpha = self.material.factor[3];
+        if let Some(texture) = self.texture {
+            let (uv, lod) = self.at(x, y);
+            alpha *= texture.mip(lod).alpha(uv, self.address());
+        }
+        if let Some(plane) = &self.alpha {
+            alpha *= plane.value(x, y) / self.q.value(x, y);
+        }
+        self.material.cutoff.is_none_or(|cutoff| alpha >= cutoff)
+    }
+
+    /// Alpha test of the samples of a row from `from` on that are not hit yet.
+    pub fn test_row(&self, y: i32, from: i32, samples: &mut [u8]) {
+        let todo = samples
+            .iter_mut()
+            .zip(from..)
+            .filter(|(sample, _)| **sample == 0);
+        match (self.texture, self.lod, self.material.cutoff) {
+            (Some(texture), Some(lod), Some(cutoff)) if self.is_flat() && self.alpha.is_none() => {
+                // The usual case, with everything that is the same in the row taken out.
+                let (mip, address) = (texture.mip(lod), self.address());
+                let (u, v) = (self.u.row(y), self.v.row(y));
+                let factor = self.material.factor[3];
+                for (sample, x) in todo {
+                    let alpha = mip.alpha([u.value(x), v.value(x)], address);
+                    *sample = (factor * alpha >= cutoff) as u8;
+                }
+            }
+            _ => todo.for_each(|(sample, x)| *sample = self.passes(x, y) as u8),
+        }
+    }
+
+    /// Linear base colour without vertex colours.
+    pub fn albedo(&self, x: i32, y: i32) -> [f32; 3] {
+        let [r, g, b, _] = self.material.factor;
+        match self.texture {
+            None => [r, g, b],
+            Some(texture) => {
+                let (uv, lod) = self.at(x, y);
+                let [tr, tg, tb] = texture.mip(lod).rgb(uv, self.address());
+                [r * tr, g * tg, b * tb]
+            }
+        }
+    }
+}
