@@ -3,7 +3,7 @@
 use glam::{Vec2, Vec3};
 use pleach::space::raster::{
     Camera, EMPTY, Geometry, Light, Material, Mips, Sampling, Scene, Texture, Wrap, coverage,
-    coverage_with_stats, draw,
+    coverage_multisampled, coverage_with_stats, draw,
 };
 
 /// Owned triangles to borrow a [`Geometry`] from.
@@ -403,6 +403,29 @@ fn triangles_behind_or_far_outside_are_left_out() {
     assert_eq!(
         coverage(&scene(&shape, &opaque(), &[]), &camera(), GRID4).area(),
         1.75
+    );
+}
+
+#[test]
+fn multisampling_smooths_edges_and_tests_alpha_once_a_pixel() {
+    let shape = Shape::default().rectangle(Vec2::new(-2.0, -2.0), Vec2::new(0.5, 2.0), 0.0);
+    let cover = coverage_multisampled(&scene(&shape, &opaque(), &[]), &camera());
+    // Two of the four samples lie in the left half of the pixel at the edge.
+    assert_eq!(
+        cover.fraction[24..32],
+        [0.0, 0.0, 1.0, 1.0, 0.5, 0.0, 0.0, 0.0]
+    );
+    // Alpha that ends at the middle of a pixel keeps or drops all of its samples.
+    let texture = [Texture::from_alpha(
+        8,
+        1,
+        vec![255, 255, 255, 255, 0, 0, 0, 0],
+    )];
+    let shape = Shape::default().rectangle(Vec2::splat(-4.25), Vec2::splat(3.75), 0.0);
+    let cover = coverage_multisampled(&scene(&shape, &cut(), &texture), &camera());
+    assert_eq!(
+        cover.fraction[24..32],
+        [1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0]
     );
 }
 

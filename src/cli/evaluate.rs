@@ -30,7 +30,7 @@ pub struct Args {
     /// Azimuth of the first view, degrees; another offset gives another set of views.
     #[arg(long, default_value_t = 0.0, allow_hyphen_values = true)]
     azimuth_offset: f32,
-    /// Draw the levels also as an engine does: one sample a pixel, box mips, alpha test.
+    /// Draw the levels also as an engine does: box mips, alpha test, fourfold multisampling.
     #[arg(long)]
     client: bool,
     /// Print the report as JSON instead of a table.

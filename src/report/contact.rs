@@ -28,12 +28,6 @@ pub fn contact_sheet(
 ) -> (u32, u32, Vec<u8>) {
     let height = original.height();
     let cameras: Vec<Camera> = views.iter().map(|v| v.camera(height, height_px)).collect();
-    let cell = cameras.first().map_or(1, |c| c.width);
-    let (width, rows) = (cell * 3 * views.len() as u32, levels.len() as u32);
-    let mut sheet = Sheet {
-        width,
-        rgba: vec![255; (width * cell * rows) as usize * 4],
-    };
     let shaded = |model: &Model, sampling| -> Vec<Picture> {
         let drawable = Drawable::shaded(model);
         let (scene, place) = (drawable.scene(), drawable.placement_in(original.frame));
@@ -44,16 +38,35 @@ pub fn contact_sheet(
         cameras.par_iter().map(shade).collect()
     };
     let originals = shaded(original, Sampling::REFERENCE);
+    let levels: Vec<_> = levels.iter().map(|level| shaded(level, sampling)).collect();
+    // Every view is cut to what anything covers in it, so that trees are large on the sheet.
+    let crops: Vec<Crop> = (0..views.len())
+        .map(|i| {
+            Crop::around(
+                [&originals[i]]
+                    .into_iter()
+                    .chain(levels.iter().map(|l| &l[i])),
+            )
+        })
+        .collect();
+    let row_height = crops.iter().map(|c| c.height).max().unwrap_or(1);
+    let width = crops.iter().map(|c| 3 * c.width).sum::<usize>().max(1);
+    let total = row_height * levels.len();
+    let mut sheet = Sheet {
+        width,
+        rgba: vec![255; width * total * 4],
+    };
     for (row, level) in levels.iter().enumerate() {
-        let y = row as u32 * cell;
-        for (column, (a, b)) in originals.iter().zip(shaded(level, sampling)).enumerate() {
-            let x = column as u32 * cell * 3;
-            sheet.put(x, y, cell, &a.over(BACKGROUND));
-            sheet.put(x + cell, y, cell, &b.over(BACKGROUND));
-            sheet.put(x + 2 * cell, y, cell, &difference(&a.coverage, &b.coverage));
+        let (mut x, y) = (0, row * row_height);
+        for ((a, b), crop) in originals.iter().zip(level).zip(&crops) {
+            let map = difference(&a.coverage, &b.coverage);
+            for rgba in [a.over(BACKGROUND), b.over(BACKGROUND), map] {
+                sheet.put(x, y, &rgba, a.width as usize, crop);
+                x += crop.width;
+            }
         }
     }
-    (width, cell * rows, sheet.rgba)
+    (width as u32, total as u32, sheet.rgba)
 }
 
 /// RGBA map of where two silhouettes agree.
@@ -71,15 +84,59 @@ fn difference(original: &[f32], level: &[f32]) -> Vec<u8> {
 }
 
 struct Sheet {
-    width: u32,
+    width: usize,
     rgba: Vec<u8>,
 }
 
+/// A part of a picture, in pixels.
+struct Crop {
+    x: usize,
+    y: usize,
+    width: usize,
+    height: usize,
+}
+
+/// White around each cell, pixels.
+const MARGIN: usize = 4;
+
+impl Crop {
+    fn around<'a>(pictures: impl Iterator<Item = &'a Picture>) -> Self {
+        let (mut low, mut high) = ([usize::MAX; 2], [0; 2]);
+        let mut size = [0; 2];
+        for picture in pictures {
+            size = [picture.width as usize, picture.height as usize];
+            let covered = picture
+                .coverage
+                .iter()
+                .enumerate()
+                .filter(|(_, c)| **c > 0.0);
+            for (i, _) in covered {
+                let at = [i % size[0], i / size[0]];
+                for axis in 0..2 {
+                    low[axis] = low[axis].min(at[axis]);
+                    high[axis] = high[axis].max(at[axis] + 1);
+                }
+            }
+        }
+        let [(x, width), (y, height)] = [0, 1].map(|axis| {
+            let from = low[axis].min(high[axis]).saturating_sub(MARGIN);
+            (from, (high[axis] + MARGIN).min(size[axis]) - from)
+        });
+        Self {
+            x,
+            y,
+            width,
+            height,
+        }
+    }
+}
+
 impl Sheet {
-    fn put(&mut self, x: u32, y: u32, size: u32, rgba: &[u8]) {
-        for (row, line) in rgba.chunks_exact(size as usize * 4).enumerate() {
-            let at = ((y as usize + row) * self.width as usize + x as usize) * 4;
-            self.rgba[at..at + line.len()].copy_from_slice(line);
+    fn put(&mut self, x: usize, y: usize, rgba: &[u8], row: usize, crop: &Crop) {
+        for line in 0..crop.height {
+            let from = ((crop.y + line) * row + crop.x) * 4;
+            let to = ((y + line) * self.width + x) * 4;
+            self.rgba[to..to + crop.width * 4].copy_from_slice(&rgba[from..from + crop.width * 4]);
         }
     }
 }

@@ -93,8 +93,7 @@ pub fn evaluate(
 fn measure(reference: &Reference, level: &Drawable, client: bool) -> SizeFigures {
     let mut figures = reference.compare_drawable(level, Sampling::REFERENCE);
     if client {
-        let drawn = reference.compare_drawable(level, Sampling::CLIENT);
-        figures.client = Some(Box::new(drawn));
+        figures.client = Some(Box::new(reference.compare_client(level)));
     }
     figures
 }

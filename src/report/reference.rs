@@ -7,7 +7,9 @@ use super::schema::{Figure, SizeFigures, ViewFigures};
 use super::silhouette::{Agreement, agreement, ratio};
 use crate::botany::Model;
 use crate::botany::model::Frame;
-use crate::space::raster::{Camera, Coverage, Placement, Sampling, Scene, coverage};
+use crate::space::raster::{
+    Camera, Coverage, Placement, Sampling, Scene, coverage, coverage_multisampled,
+};
 use crate::space::view::View;
 
 /// An original at one size on the screen, drawn once from every view with 4 x 4 samples a pixel.
@@ -102,15 +104,21 @@ impl Reference {
         placement: Placement,
         sampling: Sampling,
     ) -> SizeFigures {
-        let views = self
-            .pictures
-            .par_iter()
-            .map(|picture| {
-                let level = coverage(scene, &picture.camera.placed(placement), sampling).coverage();
-                picture.figures(&level)
-            })
-            .collect();
-        self.summary(views)
+        self.compare_pictures(|camera| {
+            coverage(scene, &camera.placed(placement), sampling).coverage()
+        })
+    }
+
+    /// Compares a level as an engine draws it by default: mips by derivative, alpha test, four
+    /// samples a pixel for edges and one for materials.
+    pub fn compare_client(&self, level: &Drawable) -> SizeFigures {
+        let (scene, placement) = (level.scene(), level.placement_in(self.frame));
+        self.compare_pictures(|camera| coverage_multisampled(&scene, &camera.placed(placement)))
+    }
+
+    fn compare_pictures(&self, draw: impl Fn(&Camera) -> Coverage + Sync) -> SizeFigures {
+        let figures = |picture: &Picture| picture.figures(&draw(&picture.camera));
+        self.summary(self.pictures.par_iter().map(figures).collect())
     }
 
     fn summary(&self, views: Vec<ViewFigures>) -> SizeFigures {

@@ -63,8 +63,8 @@ pub struct SizeFigures {
     pub area_ratio: Figure,
     /// The same from pixels that are at least half covered.
     pub half_area_ratio: Figure,
-    /// The level as an engine draws it (one sample a pixel, box mips, alpha test) against the
-    /// same supersampled original; only where it was asked for.
+    /// The level as an engine draws it (box mips, alpha test, fourfold multisampling) against
+    /// the same supersampled original; only where it was asked for.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub client: Option<Box<SizeFigures>>,
     /// The views, one by one.

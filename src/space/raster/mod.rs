@@ -8,6 +8,7 @@
 //! ```text
 //! Scene = Geometry + Material + Texture   borrowed: geometry stays while alpha is tried out
 //! coverage(scene, camera, sampling)       which samples are hit; no depth, no colour: fast
+//! coverage_multisampled(scene, camera)    the same as a page with four samples a pixel shows it
 //! draw(scene, camera, sampling)           nearest triangle of every sample -> colour, normal, depth
 //! ```
 //!
@@ -19,6 +20,7 @@ mod draw;
 mod fragment;
 mod image;
 mod mips;
+mod msaa;
 mod shade;
 mod texture;
 mod triangle;
@@ -27,6 +29,7 @@ pub use camera::{Camera, Placement};
 pub use coverage::{Coverage, Mask, Stats, coverage, coverage_with_stats};
 pub use draw::{EMPTY, Items, draw};
 pub use image::Picture;
+pub use msaa::coverage_multisampled;
 pub use shade::{Light, linear_from_srgb, srgb_from_linear};
 pub use texture::{Texture, Wrap};
 

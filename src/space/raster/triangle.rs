@@ -84,6 +84,16 @@ impl Triangle {
         })
     }
 
+    /// The same triangle, moved by sub-samples.
+    pub fn moved(&self, right: i32, down: i32) -> Self {
+        let corners = self.corners.map(|c| Corner {
+            x: c.x + right,
+            y: c.y + down,
+            ..c
+        });
+        Self { corners, ..*self }
+    }
+
     /// How a quantity with these values at the model's corners varies over the screen.
     pub fn plane(&self, values: [f32; 3]) -> Plane {
         let [a, b, c] = &self.corners;
