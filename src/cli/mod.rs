@@ -2,6 +2,7 @@
 
 mod bake;
 mod evaluate;
+mod grow;
 mod inspect;
 
 use std::ffi::OsString;
@@ -20,6 +21,7 @@ struct Cli {
 enum Command {
     Bake(bake::Args),
     Evaluate(evaluate::Args),
+    Grow(grow::GrowArgs),
     Inspect(inspect::InspectArgs),
 }
 
@@ -32,12 +34,13 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
             return ExitCode::from(if error.use_stderr() { 2 } else { 0 });
         }
     };
-    let done = match cli.command {
+    let result = match cli.command {
         Command::Bake(args) => bake::run(args),
         Command::Evaluate(args) => evaluate::run(&args),
+        Command::Grow(args) => grow::run(&args),
         Command::Inspect(args) => inspect::run(&args),
     };
-    match done {
+    match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {error}");
