@@ -11,9 +11,11 @@ use super::skeleton::near::{Contact, Grid, Segment};
 use super::tree::{Leaf, NO_NODE, Skeleton, Tree};
 
 /// Leaves of a class that are asked where their base is.
-const SAMPLE: usize = 400;
-/// Most points of one leaf that may be its base.
-const MOST_POINTS: usize = 64;
+const SAMPLE: usize = 200;
+/// Most corners of one leaf that may be its base.
+const MOST_POINTS: usize = 48;
+/// With at most this many corners the middle of any two may be the base.
+const MOST_PAIRED: usize = 12;
 
 /// Sets `node` of every leaf.
 pub fn attach_leaves(tree: &mut Tree, warnings: &mut Vec<String>) {
@@ -21,14 +23,15 @@ pub fn attach_leaves(tree: &mut Tree, warnings: &mut Vec<String>) {
         return;
     }
     let grid = Grid::new(segments(&tree.skeleton));
-    let bases = base_of_classes(tree, &grid);
+    let bases = bases_of_classes(tree, &grid);
     let found: Vec<(u32, f32)> = tree
         .leaves
         .par_iter()
         .map(|leaf| {
-            let points = base_points(tree, leaf);
-            let at = (bases[leaf.class as usize] as usize).min(points.len() - 1);
-            nearest(&grid, points[at]).map_or((NO_NODE, f32::MAX), |hit| {
+            let base = bases[leaf.class as usize];
+            let outline = Outline::of(tree, leaf);
+            let hit = nearest(&grid, outline.point(base.point), base.depth);
+            hit.map_or((NO_NODE, f32::MAX), |hit| {
                 (hit.node(&tree.skeleton), hit.contact.gap())
             })
         })
@@ -36,7 +39,7 @@ pub fn attach_leaves(tree: &mut Tree, warnings: &mut Vec<String>) {
     let mut far = 0;
     for (leaf, (node, gap)) in tree.leaves.iter_mut().zip(found) {
         leaf.node = node;
-        far += (gap > 2.0 * leaf.area.max(0.0).sqrt() + 0.01) as usize;
+        far += usize::from(gap > 2.0 * leaf.area.max(0.0).sqrt() + 0.01);
     }
     if far > 0 {
         warnings.push(format!(
@@ -81,77 +84,155 @@ impl Hit {
     }
 }
 
-/// The branch that a leaf's base most likely grows from: the nearest surface, and of several
-/// that hold the point the one whose centre line is nearest.
-fn nearest(grid: &Grid, p: Vec3) -> Option<Hit> {
+/// The branch that a leaf's base most likely grows from: the one in which it sits as deep as
+/// leaves of its class do (`depth` 0: on the centre line, 1: on the surface).
+fn nearest(grid: &Grid, p: Vec3, depth: f32) -> Option<Hit> {
     let mut reach = 0.25 * grid.cell();
     loop {
         let mut best: Option<Hit> = None;
+        let mut gap = f32::MAX;
         grid.each_near(p, reach, |segment| {
             let contact = segment.contact(p);
-            let cost = contact.gap() + 0.5 * contact.distance.min(contact.radius);
+            gap = gap.min(contact.gap());
+            let off = (contact.distance - depth * contact.radius).abs();
             let hit = Hit {
-                cost,
+                cost: contact.gap() + 0.5 * off.min(contact.radius),
                 chain: segment.chain,
                 index: segment.index,
                 contact,
             };
-            let better = |b: &Hit| (cost, hit.chain, hit.index) < (b.cost, b.chain, b.index);
+            let better = |b: &Hit| (hit.cost, hit.chain, hit.index) < (b.cost, b.chain, b.index);
             if best.as_ref().is_none_or(better) {
                 best = Some(hit);
             }
         });
-        if best.is_some_and(|b| b.contact.gap() <= reach) || reach > grid.whole(p) {
+        if gap <= reach || reach > grid.whole(p) {
             return best;
         }
         reach *= 2.0;
     }
 }
 
-/// Corners and edge middles of a leaf, in the order of its triangles.
-fn base_points(tree: &Tree, leaf: &Leaf) -> Vec<Vec3> {
-    let stride = (leaf.triangles.len() * 6).div_ceil(MOST_POINTS).max(1);
-    let mut points = Vec::with_capacity(leaf.triangles.len() * 6);
-    for &t in &leaf.triangles {
-        let [a, b, c] = tree.model.corners(t);
-        points.extend([a, b, c, (a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0]);
+/// Where leaves of a class are attached.
+#[derive(Clone, Copy, Debug, Default)]
+struct Base {
+    point: BasePoint,
+    /// Distance from the branch's centre line over the branch's radius there, 0 to 1.
+    depth: f32,
+}
+
+/// A point of a leaf that all its copies have: the middle of two corners, moved towards the
+/// centre of the leaf (cards reach a little below the stalk that is painted on them).
+#[derive(Clone, Copy, Debug, Default)]
+struct BasePoint {
+    corners: [usize; 2],
+    inward: f32,
+}
+
+/// The corners of a leaf in the order of the file's vertices, which mirroring doesn't change
+/// (the order of a triangle's corners it does).
+struct Outline {
+    corners: Vec<Vec3>,
+    center: Vec3,
+}
+
+impl Outline {
+    fn of(tree: &Tree, leaf: &Leaf) -> Self {
+        let mut vertices: Vec<u32> = (leaf.triangles.iter())
+            .flat_map(|&t| tree.model.triangles[t as usize])
+            .collect();
+        vertices.sort_unstable();
+        vertices.dedup();
+        let stride = vertices.len().div_ceil(MOST_POINTS).max(1);
+        Self {
+            corners: (vertices.iter().step_by(stride))
+                .map(|&v| tree.model.positions[v as usize])
+                .collect(),
+            center: leaf.center,
+        }
     }
-    points.into_iter().step_by(stride).collect()
+
+    fn point(&self, base: BasePoint) -> Vec3 {
+        let last = self.corners.len() - 1;
+        let [a, b] = base.corners.map(|c| self.corners[c.min(last)]);
+        ((a + b) / 2.0).lerp(self.center, base.inward)
+    }
+
+    /// Corners, and the middles of any two where there are few.
+    fn candidates(&self) -> Vec<BasePoint> {
+        let count = self.corners.len();
+        let mut out = Vec::new();
+        for i in 0..count {
+            let to = if count <= MOST_PAIRED { count } else { i + 1 };
+            out.extend((i..to).map(|j| BasePoint {
+                corners: [i, j],
+                inward: 0.0,
+            }));
+        }
+        out
+    }
 }
 
 /// For each class the point of its leaves that lies nearest to wood, by median.
-fn base_of_classes(tree: &Tree, grid: &Grid) -> Vec<u32> {
+fn bases_of_classes(tree: &Tree, grid: &Grid) -> Vec<Base> {
     let mut members: Vec<Vec<u32>> = vec![Vec::new(); tree.leaf_classes.len()];
+    let mut seen = vec![0u32; tree.leaf_classes.len()];
     for (index, leaf) in tree.leaves.iter().enumerate() {
-        let class = &tree.leaf_classes[leaf.class as usize];
-        let list = &mut members[leaf.class as usize];
+        let class = leaf.class as usize;
         // Evenly over the tree, not the first ones of the file.
-        let stride = (class.count as usize).div_ceil(SAMPLE).max(1);
-        let seen = index % stride == 0;
-        if seen || list.is_empty() {
-            list.push(index as u32);
+        let stride = (tree.leaf_classes[class].count as usize)
+            .div_ceil(SAMPLE)
+            .max(1);
+        if seen[class] as usize % stride == 0 {
+            members[class].push(index as u32);
         }
+        seen[class] += 1;
     }
     members
         .par_iter()
         .map(|list| {
-            let costs: Vec<Vec<f32>> = (list.iter())
-                .map(|&leaf| {
-                    let points = base_points(tree, &tree.leaves[leaf as usize]);
-                    let cost = |&p: &Vec3| nearest(grid, p).map_or(f32::MAX, |h| h.cost);
-                    points.iter().map(cost).collect()
-                })
+            let outlines: Vec<Outline> = (list.iter())
+                .map(|&leaf| Outline::of(tree, &tree.leaves[leaf as usize]))
                 .collect();
-            let count = costs.iter().map(Vec::len).min().unwrap_or(0);
-            let median = |point: usize| {
-                let mut column: Vec<f32> = costs.iter().map(|c| c[point]).collect();
-                column.sort_unstable_by(f32::total_cmp);
-                column[column.len() / 2]
-            };
-            (0..count as u32)
-                .map(|point| (median(point as usize), point))
-                .min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))
-                .map_or(0, |best| best.1)
+            base_of_class(&outlines, grid)
         })
         .collect()
+}
+
+fn base_of_class(outlines: &[Outline], grid: &Grid) -> Base {
+    let Some(first) = outlines.first() else {
+        return Base::default();
+    };
+    let cost = |point: BasePoint| {
+        let hits = outlines
+            .iter()
+            .filter_map(|o| nearest(grid, o.point(point), 0.0));
+        median(hits.map(|h| h.cost).collect())
+    };
+    let best_of = |points: Vec<BasePoint>| {
+        let costs = points.into_iter().map(|p| (cost(p), p));
+        // The first of equally good ones: corners before middles.
+        costs.fold((f32::MAX, BasePoint::default()), |best, next| {
+            if next.0 < best.0 { next } else { best }
+        })
+    };
+    let (_, corner) = best_of(first.candidates());
+    let inward = (0..=16).map(|k| BasePoint {
+        inward: k as f32 * 0.025,
+        ..corner
+    });
+    let (_, point) = best_of(inward.collect());
+    let hits = outlines
+        .iter()
+        .filter_map(|o| nearest(grid, o.point(point), 0.0));
+    let depths = hits.map(|h| h.contact.distance / h.contact.radius.max(1e-9));
+    Base {
+        point,
+        depth: median(depths.collect()).min(1.0),
+    }
+}
+
+fn median(mut values: Vec<f32>) -> f32 {
+    values.sort_unstable_by(f32::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(0.0)
 }

@@ -16,6 +16,8 @@ use super::tree::{Leaf, LeafClass, NO_NODE, Organ};
 
 /// Centres closer than this share of the mean radius belong to one leaf.
 const SAME_CENTER: f64 = 0.05;
+/// Share of pieces with a partner from which on leaves count as crossed.
+const CROSSED_SHARE: f64 = 0.25;
 /// Relative difference of signatures up to which leaves may be congruent.
 const SAME_SHAPE: f64 = 4e-3;
 /// Classes that one leaf is compared with at most before it founds its own.
@@ -105,7 +107,7 @@ pub fn signature(parts: &Parts, triangles: &[u32]) -> Signature {
 }
 
 /// Collects the leaves of all foliage parts.
-pub fn find(model: &Model, parts: &Parts, organs: &mut [Organ]) -> Leaves {
+pub fn find(model: &Model, parts: &Parts, organs: &[Organ]) -> Leaves {
     let foliage: Vec<usize> = (0..organs.len())
         .filter(|&p| organs[p] == Organ::Foliage)
         .collect();
@@ -140,9 +142,12 @@ pub fn find(model: &Model, parts: &Parts, organs: &mut [Organ]) -> Leaves {
     Leaves { leaves, classes }
 }
 
-/// Joins pieces of about the same size and centre: the quads of a cross.
+/// Joins pieces of about the same size and centre: the quads of a cross. Crosses are a habit of
+/// whoever made the file; where only a few pieces have a partner they met by chance.
 fn unite_concentric(pieces: &[Signature]) -> DisjointSets {
-    let mut sets = DisjointSets::new(pieces.len());
+    let apart = DisjointSets::new(pieces.len());
+    let mut sets = apart.clone();
+    let mut paired = vec![false; pieces.len()];
     let mut by_x: Vec<u32> = (0..pieces.len() as u32).collect();
     let center = |i: u32| pieces[i as usize].center;
     by_x.par_sort_unstable_by(|&a, &b| center(a).x.total_cmp(&center(b).x).then(a.cmp(&b)));
@@ -158,10 +163,13 @@ fn unite_concentric(pieces: &[Signature]) -> DisjointSets {
                 && (ra - rb).abs() <= 0.2 * ra.max(rb)
             {
                 sets.unite(a, b);
+                paired[a as usize] = true;
+                paired[b as usize] = true;
             }
         }
     }
-    sets
+    let share = paired.iter().filter(|p| **p).count() as f64 / pieces.len().max(1) as f64;
+    if share >= CROSSED_SHARE { sets } else { apart }
 }
 
 /// Gives every leaf its class. Leaves are compared only with classes in the neighbouring cells

@@ -24,6 +24,13 @@ const CLEAR_MAJORITY: f64 = 0.85;
 /// Copies of a small closed shape that make it a needle or a fruit instead of a twig.
 const MANY_COPIES: usize = 64;
 
+/// Copies of a flat shape that make it a leaf in a file of one material.
+const SOME_COPIES: usize = 8;
+/// Area over the square of the mean radius below which a part is a sliver.
+const SLIVER: f64 = 0.02;
+/// A scrap of wood has at most this many triangles.
+const MOST_SCRAP_TRIANGLES: usize = 32;
+
 /// How one part is shaped.
 #[derive(Clone, Copy, Debug, Default)]
 struct Shape {
@@ -66,16 +73,36 @@ pub fn classify(
         let triangle = parts.triangles.get(part)[0];
         model.objects[model.triangle_object[triangle as usize] as usize].material as usize
     };
-    let copies = copies_of_closed_parts(parts, &shapes, &organs);
-    let votes = count_votes(parts, &organs, &copies, model.materials.len(), material_of);
-    let has_tubes = votes.iter().any(|v| v.share() > CLEAR_MAJORITY);
+    let alike = copies(parts, &shapes, |part| organs[part] == Organ::Wood);
+    let votes = count_votes(parts, &organs, &alike, model.materials.len(), material_of);
+    let wood = votes.iter().any(|v| v.share() > CLEAR_MAJORITY);
+    let foliage = (votes.iter()).any(|v| v.all > 0.0 && v.share() < 1.0 - CLEAR_MAJORITY);
+    let leaf_like = if foliage {
+        vec![0; organs.len()]
+    } else {
+        copies(parts, &shapes, |part| organs[part] == Organ::Foliage)
+    };
+    let elsewhere = Elsewhere { wood, foliage };
     for (part, organ) in organs.iter_mut().enumerate() {
         let material = material_of(part);
-        *organ = votes[material].judge(&model.materials[material], *organ, copies[part], has_tubes);
+        let copies = alike[part].max(leaf_like[part]);
+        *organ = votes[material].judge(&model.materials[material], *organ, copies, elsewhere);
     }
-    keep_one_kind_of_wood(model, parts, &shapes, &mut organs, &votes, material_of);
+    keep_one_kind_of_wood(model, &shapes, &mut organs, &votes, material_of);
     apply_rules(model, parts, options, &mut organs, warnings);
     organs
+}
+
+/// Which parts are scraps of wood: a few triangles that are no tube.
+pub fn scraps(parts: &Parts, organs: &[Organ]) -> Vec<bool> {
+    (0..organs.len())
+        .into_par_iter()
+        .map(|part| {
+            organs[part] == Organ::Wood
+                && parts.triangles.get(part).len() <= MOST_SCRAP_TRIANGLES
+                && !shape(parts, part).is_tube()
+        })
+        .collect()
 }
 
 /// What the parts of one material say.
@@ -92,23 +119,33 @@ impl Votes {
         (self.wood - self.copied) / self.all.max(1.0)
     }
 
-    fn judge(&self, material: &Material, own: Organ, copies: usize, has_tubes: bool) -> Organ {
+    fn judge(&self, material: &Material, own: Organ, copies: usize, elsewhere: Elsewhere) -> Organ {
         let share = self.wood / self.all.max(1.0);
-        // Needles as prisms and round fruits: closed, but all alike, beside real wood.
-        let copied = copies >= MANY_COPIES && has_tubes;
         let hint = named_organ(&material.name);
-        if self.copied > CLEAR_MAJORITY * self.all && has_tubes && hint != Some(Organ::Wood) {
+        // Needles as prisms and round fruits: closed, but all alike, beside real wood.
+        let needles = self.copied > CLEAR_MAJORITY * self.all && elsewhere.wood;
+        if needles && hint != Some(Organ::Wood) {
             Organ::Foliage
         } else if share > CLEAR_MAJORITY {
-            Organ::Wood
-        } else if share < 1.0 - CLEAR_MAJORITY {
+            // Flat scraps are crushed twigs, but many like ones in a file without any other
+            // foliage are its leaves.
+            let leaf = own == Organ::Foliage && copies >= SOME_COPIES && !elsewhere.foliage;
+            if leaf { Organ::Foliage } else { Organ::Wood }
+        } else if share < 1.0 - CLEAR_MAJORITY && elsewhere.wood {
             Organ::Foliage
-        } else if copied {
+        } else if own == Organ::Wood && copies >= MANY_COPIES {
             hint.unwrap_or(Organ::Foliage)
         } else {
             own
         }
     }
+}
+
+/// Whether some material of the file is clearly wood, and some clearly foliage.
+#[derive(Clone, Copy, Debug)]
+struct Elsewhere {
+    wood: bool,
+    foliage: bool,
 }
 
 fn count_votes(
@@ -133,26 +170,23 @@ fn count_votes(
     votes
 }
 
-/// For each tube the number of tubes that look the same (0 for all else).
-fn copies_of_closed_parts(parts: &Parts, shapes: &[Shape], organs: &[Organ]) -> Vec<usize> {
+/// For each small part that is asked for, the number of those that look the same (0 for slivers
+/// and all else).
+fn copies(parts: &Parts, shapes: &[Shape], asked: impl Fn(usize) -> bool + Sync) -> Vec<usize> {
     let total: f64 = shapes.iter().map(|s| s.area).sum();
-    let mut keys: Vec<([i64; 4], usize)> = organs
-        .par_iter()
-        .enumerate()
-        .filter(|&(part, &organ)| {
-            organ == Organ::Wood
-                && shapes[part].area < total * 1e-3
+    let mut keys: Vec<([i64; 4], usize)> = (0..shapes.len())
+        .into_par_iter()
+        .filter(|&part| {
+            asked(part)
+                && shapes[part].area < total * 0.02
                 && parts.triangles.get(part).len() <= 256
         })
-        .map(|(part, _)| {
-            (
-                signature(parts, parts.triangles.get(part)).coarse_key(),
-                part,
-            )
-        })
+        .map(|part| (signature(parts, parts.triangles.get(part)), part))
+        .filter(|(sign, _)| sign.invariants[0] > SLIVER)
+        .map(|(sign, part)| (sign.coarse_key(), part))
         .collect();
     keys.par_sort_unstable();
-    let mut copies = vec![0; organs.len()];
+    let mut copies = vec![0; shapes.len()];
     for run in keys.chunk_by(|a, b| a.0 == b.0) {
         for &(_, part) in run {
             copies[part] = run.len();
@@ -165,7 +199,6 @@ fn copies_of_closed_parts(parts: &Parts, shapes: &[Shape], organs: &[Organ]) -> 
 /// material is clearly wood, what is not clearly wood is foliage.
 fn keep_one_kind_of_wood(
     model: &Model,
-    parts: &Parts,
     shapes: &[Shape],
     organs: &mut [Organ],
     votes: &[Votes],
@@ -180,12 +213,12 @@ fn keep_one_kind_of_wood(
     if wood_area < 0.02 * all_area {
         return;
     }
-    for part in 0..parts.triangles.len() {
+    for (part, organ) in organs.iter_mut().enumerate() {
         let material = material_of(part);
         let cut_out = model.materials[material].alpha_mode != AlphaMode::Opaque;
         let foliage_by_name = named_organ(&model.materials[material].name) == Some(Organ::Foliage);
         if !clear(material) && (cut_out || foliage_by_name) {
-            organs[part] = Organ::Foliage;
+            *organ = Organ::Foliage;
         }
     }
 }

@@ -1,9 +1,10 @@
 //! Welded connected parts: triangles that share an edge in space, whatever their indices say.
 //!
 //! Vertices are welded by position, since exporters split them at seams of texture or normal, and
-//! triangle soup shares none at all. Parts grow over shared *edges*, not shared points: the
-//! blades of a fan palm meet in one point and are still leaves of their own, and a hexagon in two
-//! pieces is one leaf. Edges of different materials never join.
+//! triangle soup shares none at all. Parts grow over shared indices and over *edges* that share
+//! positions, but not over mere points that do: the blades of a fan palm meet in one point and
+//! are still leaves of their own, a hexagon in two pieces is one leaf, and leaflets that the file
+//! itself ties to one stalk stay together. Different materials never join.
 
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
@@ -13,9 +14,14 @@ use rayon::prelude::*;
 
 use super::model::Model;
 
-/// Vertices closer than this (bounding-sphere radii) are one: about 16 steps of f32 at the
-/// radius, a fiftieth of a millimetre on a tree of 20 m.
-pub const WELD_TOLERANCE: f32 = 2e-6;
+/// Vertices closer than this (bounding-sphere radii) are one: a few steps of f32 at the radius,
+/// three thousandths of a millimetre on a tree of 20 m. Ten times as much would close the tips of
+/// twigs that taper to a point.
+pub const WELD_TOLERANCE: f32 = 3e-7;
+
+/// Scraps closer than this to other wood belong to it (bounding-sphere radii): a tenth of a
+/// millimetre on a tree of 20 m.
+pub const MEND_TOLERANCE: f32 = 1e-5;
 
 /// The parts of a model.
 #[derive(Clone, Debug, Default)]
@@ -96,6 +102,7 @@ pub fn find(model: &Model) -> Parts {
         model.objects[object as usize].material
     };
     let mut sets = DisjointSets::new(welded.len());
+    join_indices(model, &material, &mut sets);
     let duplicate = join_duplicates(&welded, &material, &mut sets);
     join_edges(model, &points, &welded, &duplicate, &material, &mut sets);
     let (triangle_part, count) = sets.labels();
@@ -107,6 +114,21 @@ pub fn find(model: &Model) -> Parts {
         duplicate,
         triangle_part,
         triangles,
+    }
+}
+
+/// Unites triangles that share a vertex of the file.
+fn join_indices(model: &Model, material: &impl Fn(u32) -> u32, sets: &mut DisjointSets) {
+    let mut first = vec![u32::MAX; model.positions.len()];
+    for (triangle, corners) in (0u32..).zip(&model.triangles) {
+        for &vertex in corners {
+            let seen = &mut first[vertex as usize];
+            if *seen == u32::MAX {
+                *seen = triangle;
+            } else if material(*seen) == material(triangle) {
+                sets.unite(*seen, triangle);
+            }
+        }
     }
 }
 
@@ -258,6 +280,56 @@ pub fn weld(positions: &[Vec3], tolerance: f32) -> (Vec<u32>, Vec<Vec3>) {
         vertex_point.push(found);
     }
     (vertex_point, points)
+}
+
+/// Joins what is left of twigs so thin that rounding tore them: the parts that `is_scrap` names
+/// are joined to parts of the same kind (`kind`) that come within [`MEND_TOLERANCE`], and points
+/// that close become one.
+pub fn mend(parts: &mut Parts, is_scrap: &[bool], kind: &[u32]) {
+    if !is_scrap.contains(&true) {
+        return;
+    }
+    let torn = (is_scrap.iter().zip(kind))
+        .filter_map(|(&scrap, &kind)| scrap.then_some(kind))
+        .collect::<std::collections::BTreeSet<u32>>();
+    let mut near: Vec<(i64, u32, u32)> = Vec::new();
+    for (triangle, corners) in parts.welded.iter().enumerate() {
+        let part = parts.triangle_part[triangle];
+        if torn.contains(&kind[part as usize]) {
+            for &p in corners {
+                let x = (parts.points[p as usize].x as f64 / MEND_TOLERANCE as f64) as i64;
+                near.push((x, p, part));
+            }
+        }
+    }
+    near.par_sort_unstable();
+    near.dedup();
+    let mut part_sets = DisjointSets::new(parts.triangles.len());
+    let mut point_sets = DisjointSets::new(parts.points.len());
+    for (at, &(x, p, part)) in near.iter().enumerate() {
+        let position = parts.points[p as usize];
+        let others = near[at + 1..].iter().take_while(|o| o.0 <= x + 1);
+        // The limit keeps a wall of points in one plane from taking all day.
+        for &(_, q, other) in others.take(512) {
+            let scrap = is_scrap[part as usize] || is_scrap[other as usize];
+            let apart = position.distance_squared(parts.points[q as usize]);
+            if scrap
+                && kind[part as usize] == kind[other as usize]
+                && apart <= MEND_TOLERANCE * MEND_TOLERANCE
+            {
+                part_sets.unite(part, other);
+                point_sets.unite(p, q);
+            }
+        }
+    }
+    for corners in &mut parts.welded {
+        *corners = corners.map(|p| point_sets.root(p));
+    }
+    let (of_part, count) = part_sets.labels();
+    for part in &mut parts.triangle_part {
+        *part = of_part[*part as usize];
+    }
+    parts.triangles = Groups::from_labels(&parts.triangle_part, count);
 }
 
 /// Union by smaller index, so that a set's root is its first member.

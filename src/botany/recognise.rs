@@ -39,9 +39,10 @@ pub fn recognise(model: Model, options: &RecogniseOptions) -> Result<Tree> {
         ));
     }
     let mut warnings = Vec::new();
-    let parts = part::find(&model);
-    let mut organs = organ::classify(&model, &parts, options, &mut warnings);
-    let leaves = leaf::find(&model, &parts, &mut organs);
+    let mut parts = part::find(&model);
+    let organs = organ::classify(&model, &parts, options, &mut warnings);
+    let organs = mend_twigs(&mut parts, organs);
+    let leaves = leaf::find(&model, &parts, &organs);
     let (skeleton, wood_node) = skeleton::build(&parts, &organs, &mut warnings);
     let mut tree = Tree {
         organ: parts
@@ -68,4 +69,17 @@ pub fn recognise(model: Model, options: &RecogniseOptions) -> Result<Tree> {
             .all(|l| l.node == NO_NODE || (l.node as usize) < tree.skeleton.nodes.len())
     );
     Ok(tree)
+}
+
+/// Joins torn twigs; gives the organs of the parts that are left.
+fn mend_twigs(parts: &mut part::Parts, organs: Vec<Organ>) -> Vec<Organ> {
+    let scraps = organ::scraps(parts, &organs);
+    let kind: Vec<u32> = organs.iter().map(|&o| o as u32).collect();
+    let before: Vec<u32> = parts.triangles.iter().map(|t| t[0]).collect();
+    part::mend(parts, &scraps, &kind);
+    let mut after = vec![Organ::Wood; parts.triangles.len()];
+    for (triangle, organ) in before.into_iter().zip(organs) {
+        after[parts.triangle_part[triangle as usize] as usize] = organ;
+    }
+    after
 }

@@ -14,6 +14,9 @@ const THINNER: f32 = 0.8;
 /// A base that fits no branch better than this (see [`fit`]) may be a stem of its own.
 const LOOSE: f32 = 2.0;
 
+/// Parts with more nodes are branches in their own right, not segments of a longer one.
+const MOST_SEGMENT_NODES: usize = 3;
+
 /// The graph, and for each part the node of each of its triangles.
 #[derive(Clone, Debug, Default)]
 pub struct Joined {
@@ -153,11 +156,11 @@ fn parents_of_end(
             }
             let contact = segment.contact(end);
             nearest = nearest.min(contact.gap());
-            let nodes = flat.chains[segment.chain as usize].nodes.len();
+            let nodes = &flat.chains[segment.chain as usize].nodes;
             let candidate = Candidate {
-                cost: fit(radius, segment, &contact),
+                cost: fit(radius, &contact) + at_base(end, radius, nodes[0]),
                 chain: segment.chain,
-                node: (segment.index + (contact.along > 0.5) as u32).min(nodes as u32 - 1),
+                node: (segment.index + (contact.along > 0.5) as u32).min(nodes.len() as u32 - 1),
                 reversed,
             };
             keep(&mut best, candidate);
@@ -186,9 +189,8 @@ fn keep(best: &mut Vec<Candidate>, candidate: Candidate) {
 }
 
 /// How badly a base fits a branch: 0 on its centre line, 1 on its surface, more outside (in
-/// units of both radii) and where the branch is thinner than what it would carry. The very base
-/// of a branch counts as worse, since siblings start in one point without carrying each other.
-fn fit(radius: f32, segment: &Segment, contact: &Contact) -> f32 {
+/// units of both radii) and where the branch is thinner than what it would carry.
+fn fit(radius: f32, contact: &Contact) -> f32 {
     let unit = contact.radius.max(1e-9);
     let depth = if contact.distance <= contact.radius {
         contact.distance / unit
@@ -196,13 +198,14 @@ fn fit(radius: f32, segment: &Segment, contact: &Contact) -> f32 {
         let both = (0.5 * (contact.radius + radius)).max(1e-9);
         1.0 + (contact.distance - contact.radius) / both
     };
-    let thin = (THINNER * radius / unit - 1.0).clamp(0.0, 10.0);
-    let at_base = if segment.index == 0 && contact.along < 0.25 {
-        0.8 * (1.0 - contact.along / 0.25)
-    } else {
-        0.0
-    };
-    depth + thin + at_base
+    depth + (THINNER * radius / unit - 1.0).clamp(0.0, 10.0)
+}
+
+/// Siblings start in one point without carrying each other: near the other's own base a fit
+/// counts for less.
+fn at_base(end: Vec3, radius: f32, base: (Vec3, f32)) -> f32 {
+    let reach = radius.max(base.1).max(1e-9);
+    0.8 * (1.0 - end.distance(base.0) / reach).max(0.0)
 }
 
 /// The part that carries the tree: the widest, the lowest of nearly equal ones.
@@ -278,6 +281,34 @@ fn find_circle(count: usize, parent: impl Fn(usize) -> Option<usize>) -> Option<
     None
 }
 
+/// For each chain the one that carries it on: its base is this chain's tip, about as wide, and
+/// it goes on in about the same direction (branches made of one cylinder a segment).
+fn heirs(flat: &Flat, up: &[Option<(usize, u32)>]) -> Vec<Option<usize>> {
+    let mut heir: Vec<Option<usize>> = vec![None; flat.chains.len()];
+    let mut best = vec![0.0f32; flat.chains.len()];
+    for (chain, parent) in up.iter().enumerate() {
+        let Some((parent, node)) = *parent else {
+            continue;
+        };
+        let (below, above) = (&flat.chains[parent].nodes, &flat.chains[chain].nodes);
+        let short = |n: usize| (2..=MOST_SEGMENT_NODES).contains(&n);
+        if node as usize + 1 != below.len() || !short(below.len()) || !short(above.len()) {
+            continue;
+        }
+        let (tip, base) = (below[below.len() - 1], above[0]);
+        let touches = tip.0.distance(base.0) <= 0.5 * tip.1.max(base.1);
+        let alike = base.1 <= 1.4 * tip.1 && tip.1 <= 1.7 * base.1;
+        let direction = |a: Vec3, b: Vec3| (b - a).normalize_or_zero();
+        let straight =
+            direction(below[below.len() - 2].0, tip.0).dot(direction(base.0, above[1].0));
+        if touches && alike && straight > 0.6 && straight > best[parent] {
+            best[parent] = straight;
+            heir[parent] = Some(chain);
+        }
+    }
+    heir
+}
+
 /// Numbers chains and nodes from the roots outwards.
 fn assemble(
     mut parts: Vec<PartSkeleton>,
@@ -308,39 +339,47 @@ fn assemble(
             }),
         }
     };
+    let up: Vec<Option<(usize, u32)>> = (0..flat.chains.len()).map(carrier).collect();
+    let heir = heirs(&flat, &up);
     let mut children = vec![Vec::new(); flat.chains.len()];
     let mut order: Vec<usize> = Vec::new();
     for chain in 0..flat.chains.len() {
-        match carrier(chain) {
+        match up[chain] {
+            Some((up, _)) if heir[up] == Some(chain) => {}
             Some((up, _)) => children[up].push(chain),
             None => order.push(chain),
         }
     }
-    // Breadth first: order by branch order, then by part.
+    // Breadth first: by branch order, then by part.
+    let line = |first: usize| std::iter::successors(Some(first), |&c| heir[c]);
     let mut at = 0;
     while at < order.len() {
-        order.extend(children[order[at]].iter().copied());
+        for chain in line(order[at]) {
+            order.extend(children[chain].iter().copied());
+        }
         at += 1;
     }
     let mut skeleton = Skeleton::default();
     let mut new_chain = vec![0u32; flat.chains.len()];
     let mut first_node = vec![0u32; flat.chains.len()];
-    for &old in &order {
+    for &first in &order {
         let index = skeleton.chains.len() as u32;
-        new_chain[old] = index;
-        first_node[old] = skeleton.nodes.len() as u32;
-        let up = carrier(old).map(|(chain, node)| (new_chain[chain], first_node[chain] + node));
+        let up = up[first].map(|(chain, node)| (new_chain[chain], first_node[chain] + node));
         let mut parent = up.map_or(NO_NODE, |u| u.1);
-        let mut nodes = Vec::with_capacity(flat.chains[old].nodes.len());
-        for &(position, radius) in &flat.chains[old].nodes {
-            nodes.push(skeleton.nodes.len() as u32);
-            skeleton.nodes.push(Node {
-                position,
-                radius,
-                parent,
-                chain: index,
-            });
-            parent = skeleton.nodes.len() as u32 - 1;
+        let mut nodes = Vec::new();
+        for old in line(first) {
+            new_chain[old] = index;
+            first_node[old] = skeleton.nodes.len() as u32;
+            for &(position, radius) in &flat.chains[old].nodes {
+                nodes.push(skeleton.nodes.len() as u32);
+                skeleton.nodes.push(Node {
+                    position,
+                    radius,
+                    parent,
+                    chain: index,
+                });
+                parent = skeleton.nodes.len() as u32 - 1;
+            }
         }
         skeleton.chains.push(Chain {
             nodes,

@@ -21,7 +21,8 @@ const MAX_BANDS: f32 = 4000.0;
 
 /// The chains of a part; the first one starts at the base.
 pub fn trace(mesh: &PartMesh) -> PartSkeleton {
-    let distance = distances(mesh, &base(mesh));
+    let sources = base(mesh);
+    let distance = distances(mesh, &sources);
     let farthest = distance.iter().copied().fold(0.0, f32::max);
     if farthest <= 0.0 {
         return one_node(mesh);
@@ -29,18 +30,19 @@ pub fn trace(mesh: &PartMesh) -> PartSkeleton {
     let step = band_height(mesh, farthest);
     let bands = Bands::new(mesh, &distance, step);
     let pieces = bands.pieces(mesh, &distance);
-    grow_chains(mesh, &bands, pieces)
+    grow_chains(mesh, &bands, pieces, ring_of(mesh, &sources))
 }
 
 /// The points that the distance is counted from: the widest boundary loop, the lowest of those
 /// that are nearly as wide; or the lowest point of a closed skin.
 fn base(mesh: &PartMesh) -> Vec<u32> {
-    let measured: Vec<(Vec3, f32)> = (mesh.loops.iter())
-        .map(|l| {
-            let points: Vec<Vec3> = l.iter().map(|&p| mesh.points[p as usize]).collect();
-            super::tube::ring_node(&points)
-        })
-        .collect();
+    // A strip or a single triangle: its outline is no ring around anything.
+    if let [outline] = mesh.loops.as_slice()
+        && outline.len() == mesh.points.len()
+    {
+        return vec![farthest_from(mesh, farthest_from(mesh, 0))];
+    }
+    let measured: Vec<(Vec3, f32)> = (mesh.loops.iter()).map(|l| ring_of(mesh, l)).collect();
     let widest = measured.iter().map(|m| m.1).fold(0.0, f32::max);
     let best = (0..measured.len())
         .filter(|&i| measured[i].1 >= 0.7 * widest)
@@ -56,6 +58,16 @@ fn base(mesh: &PartMesh) -> Vec<u32> {
                 .collect()
         }
     }
+}
+
+/// The point that is farthest from another along the surface.
+fn farthest_from(mesh: &PartMesh, point: u32) -> u32 {
+    let distance = distances(mesh, &[point]);
+    let points = 0..mesh.points.len() as u32;
+    let d = |p: u32| distance[p as usize];
+    points
+        .max_by(|&a, &b| d(a).total_cmp(&d(b)).then(b.cmp(&a)))
+        .unwrap_or(0)
 }
 
 /// Dijkstra over the edges; points that can't be reached get 0.
@@ -98,6 +110,11 @@ fn band_height(mesh: &PartMesh, farthest: f32) -> f32 {
     // A few giant triangles among tiny ones must not be cut into thousands of bands each.
     let mean = lengths.iter().map(|&l| l as f64).sum::<f64>() / lengths.len().max(1) as f64;
     (median.max(mean as f32 / 16.0)).clamp(farthest / MAX_BANDS, farthest / 4.0)
+}
+
+fn ring_of(mesh: &PartMesh, points: &[u32]) -> (Vec3, f32) {
+    let points: Vec<Vec3> = points.iter().map(|&p| mesh.points[p as usize]).collect();
+    super::tube::ring_node(&points)
 }
 
 fn one_node(mesh: &PartMesh) -> PartSkeleton {
@@ -205,7 +222,34 @@ impl Bands {
             let share = length / p.weight;
             p.radius += (middle.distance(p.position.as_dvec3()) * share) as f32;
         }
+        self.find_ends(mesh, distance, &mut pieces);
         pieces
+    }
+}
+
+impl Bands {
+    /// The upper end of each piece: the ring or point that is farthest from the base.
+    fn find_ends(&self, mesh: &PartMesh, distance: &[f32], pieces: &mut [Piece]) {
+        let mut corners: Vec<(u32, u32)> = Vec::with_capacity(mesh.triangles.len() * 3);
+        for (index, t) in mesh.triangles.iter().enumerate() {
+            for &p in t {
+                let band = (distance[p as usize] / self.step) as u32;
+                let cell = self.first[index] + band - self.low[index];
+                corners.push((self.piece[cell as usize], p));
+            }
+        }
+        corners.sort_unstable();
+        corners.dedup();
+        for run in corners.chunk_by(|a, b| a.0 == b.0) {
+            let top = run
+                .iter()
+                .map(|c| distance[c.1 as usize])
+                .fold(0.0, f32::max);
+            let ring: Vec<u32> = (run.iter().map(|c| c.1))
+                .filter(|&p| distance[p as usize] >= top - 0.1 * self.step)
+                .collect();
+            pieces[run[0].0 as usize].end = ring_of(mesh, &ring);
+        }
     }
 }
 
@@ -221,7 +265,9 @@ fn crossing(corners: &[(DVec3, f32); 3], level: f32) -> Option<(DVec3, f64)> {
             found += 1;
         }
     }
-    (found == 2).then(|| ((ends[0] + ends[1]) / 2.0, ends[0].distance(ends[1])))
+    // A twig that is crushed to a line still has a middle.
+    let length = ends[0].distance(ends[1]).max(1e-12);
+    (found == 2).then(|| ((ends[0] + ends[1]) / 2.0, length))
 }
 
 /// A connected piece of a band.
@@ -237,6 +283,8 @@ struct Piece {
     below: Vec<(u32, f64)>,
     /// Length of the longest way from here to a tip.
     reach: f32,
+    /// Its upper end: position and radius.
+    end: (Vec3, f32),
 }
 
 impl Piece {
@@ -254,8 +302,13 @@ impl Piece {
     }
 }
 
-/// Pieces become chains.
-fn grow_chains(mesh: &PartMesh, bands: &Bands, mut pieces: Vec<Piece>) -> PartSkeleton {
+/// Pieces become chains; `foot` is the ring where the first one starts.
+fn grow_chains(
+    mesh: &PartMesh,
+    bands: &Bands,
+    mut pieces: Vec<Piece>,
+    foot: (Vec3, f32),
+) -> PartSkeleton {
     let parent: Vec<Option<usize>> = pieces.iter().map(Piece::parent).collect();
     let mut upward: Vec<usize> = (0..pieces.len()).collect();
     upward.sort_by_key(|&p| (pieces[p].band, p));
@@ -268,65 +321,110 @@ fn grow_chains(mesh: &PartMesh, bands: &Bands, mut pieces: Vec<Piece>) -> PartSk
         }
     }
 
-    let roots: Vec<usize> = upward
-        .iter()
-        .copied()
-        .filter(|&p| parent[p].is_none())
-        .collect();
     let mut chains: Vec<LocalChain> = Vec::new();
-    let mut place = vec![(0u32, 0u32); pieces.len()];
-    let mut settled = vec![false; pieces.len()];
-    let mut stack: Vec<(usize, Option<(u32, u32)>)> = Vec::new();
-    if let Some(&root) = roots.first() {
-        stack.push((root, None));
-    }
-    let mut next = 0;
-    while next < stack.len() {
-        let (mut at, from) = stack[next];
-        next += 1;
-        let chain = chains.len() as u32;
-        let mut nodes: Vec<(Vec3, f32)> = Vec::new();
-        let mut trail = vec![at];
-        loop {
-            if pieces[at].solid || nodes.is_empty() {
-                nodes.push((pieces[at].position, pieces[at].radius));
-            }
-            place[at] = (chain, nodes.len() as u32 - 1);
-            settled[at] = true;
-            let Some(on) = continuation(&pieces, &trail, &children[at]) else {
-                break;
-            };
-            for &child in children[at].iter().filter(|&&c| c != on) {
-                if pieces[child].reach
-                    > SHORTEST_IN_RADII * pieces[at].radius.max(pieces[child].radius)
-                {
-                    stack.push((child, Some(place[at])));
-                }
-            }
-            at = on;
-            trail.push(at);
-        }
-        chains.push(LocalChain {
+    let mut place: Vec<Option<(u32, u32)>> = vec![None; pieces.len()];
+    let root = upward.iter().copied().find(|&p| parent[p].is_none());
+    let mut starts: Vec<(usize, Option<(u32, u32)>)> = vec![(root.unwrap_or(0), None)];
+    while chains.len() < starts.len() {
+        let (start, from) = starts[chains.len()];
+        let nodes = if from.is_none() {
+            vec![foot]
+        } else {
+            Vec::new()
+        };
+        let (chain, forks) = follow(
+            &pieces,
+            &children,
+            start,
             nodes,
+            chains.len() as u32,
+            &mut place,
+        );
+        starts.extend(forks);
+        chains.push(LocalChain {
+            nodes: chain,
             parent: from,
         });
     }
+
     // Bumps belong to the node that they grow from.
     for &p in &upward {
-        if !settled[p] {
-            place[p] = parent[p].map_or((0, 0), |q| place[q]);
+        if place[p].is_none() {
+            place[p] = parent[p].and_then(|q| place[q]).or(Some((0, 0)));
         }
     }
     let node_of_triangle = (0..mesh.triangles.len())
         .map(|t| {
             let cells = bands.cells_of(t);
-            place[bands.piece[(cells.start + cells.end) / 2] as usize]
+            place[bands.piece[(cells.start + cells.end) / 2] as usize].unwrap_or((0, 0))
         })
         .collect();
     PartSkeleton {
         chains,
         node_of_triangle,
         by_segment: false,
+    }
+}
+
+/// A branch that forks off: its first piece, and the chain and node that carry it.
+type Fork = (usize, Option<(u32, u32)>);
+
+/// Follows a chain from its first piece to its tip; gives its nodes and what forks off.
+fn follow(
+    pieces: &[Piece],
+    children: &[Vec<usize>],
+    start: usize,
+    mut nodes: Vec<(Vec3, f32)>,
+    chain: u32,
+    place: &mut [Option<(u32, u32)>],
+) -> (Vec<(Vec3, f32)>, Vec<Fork>) {
+    let mut forks = Vec::new();
+    let mut at_fork = Vec::new();
+    let mut trail = vec![start];
+    let mut at = start;
+    loop {
+        let piece = &pieces[at];
+        if piece.solid || nodes.is_empty() {
+            nodes.push((piece.position, piece.radius));
+        }
+        let node = nodes.len() - 1;
+        place[at] = Some((chain, node as u32));
+        let Some(on) = continuation(pieces, &trail, &children[at]) else {
+            break;
+        };
+        for &child in children[at].iter().filter(|&&c| c != on) {
+            let thick = piece.radius.max(pieces[child].radius);
+            if pieces[child].reach > SHORTEST_IN_RADII * thick {
+                forks.push((child, place[at]));
+                at_fork.push(node);
+            }
+        }
+        at = on;
+        trail.push(at);
+    }
+    straighten(&mut nodes, &at_fork);
+    let (tip, radius) = pieces[at].end;
+    if let Some(last) = nodes.last().copied()
+        && last.0.distance(tip) > 0.25 * last.1.max(1e-9)
+    {
+        nodes.push((tip, radius));
+    }
+    (nodes, forks)
+}
+
+/// Where a branch leaves, a level set holds both and its middle lies between them: those nodes
+/// are put on the line between their neighbours.
+fn straighten(nodes: &mut [(Vec3, f32)], at_fork: &[usize]) {
+    let is_fork = |i: usize| at_fork.binary_search(&i).is_ok();
+    for &i in at_fork {
+        let below = (0..i).rev().find(|&j| !is_fork(j));
+        let above = (i + 1..nodes.len()).find(|&j| !is_fork(j));
+        let (Some(below), Some(above)) = (below, above) else {
+            continue;
+        };
+        let along = (i - below) as f32 / (above - below) as f32;
+        let ((p, a), (q, b)) = (nodes[below], nodes[above]);
+        nodes[i] = (p.lerp(q, along), a + (b - a) * along);
     }
 }
 

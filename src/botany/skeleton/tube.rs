@@ -30,7 +30,7 @@ pub fn trace(mesh: &PartMesh) -> Option<PartSkeleton> {
     }
     let sides = start.len();
     let (last, body) = rings.split_last()?;
-    let clean = body.len() >= 1
+    let clean = !body.is_empty()
         && body.iter().all(|ring| ring.len() == sides)
         && (last.len() == sides || last.len() == 1);
     if !clean {
