@@ -183,7 +183,7 @@ fn bases_of_classes(tree: &Tree, grid: &Grid) -> Vec<Base> {
         let stride = (tree.leaf_classes[class].count as usize)
             .div_ceil(SAMPLE)
             .max(1);
-        if seen[class] as usize % stride == 0 {
+        if (seen[class] as usize).is_multiple_of(stride) {
             members[class].push(index as u32);
         }
         seen[class] += 1;

@@ -20,8 +20,10 @@ const SAME_CENTER: f64 = 0.05;
 const CROSSED_SHARE: f64 = 0.25;
 /// Relative difference of signatures up to which leaves may be congruent.
 const SAME_SHAPE: f64 = 4e-3;
-/// Classes that one leaf is compared with at most before it founds its own.
-const MAX_COMPARED: usize = 64;
+/// Classes of like signature that one leaf is compared with before it founds its own.
+const MAX_COMPARED: usize = 6;
+/// Width of a cell of signatures; at least twice the tolerance of the largest invariants.
+const CELL: f64 = 8.0 * SAME_SHAPE;
 
 /// The leaves of a model and their classes.
 #[derive(Clone, Debug, Default)]
@@ -184,7 +186,7 @@ fn sort_into_classes(
     let mut cells: HashMap<u64, Vec<u32>, BuildHasherDefault<Mix>> = HashMap::default();
     for index in 0..leaves.len() {
         let sign = &signatures[index];
-        let [x, y] = [sign.invariants[0], sign.invariants[1]].map(|v| v / (16.0 * SAME_SHAPE));
+        let [x, y] = [sign.invariants[0], sign.invariants[1]].map(|v| v / CELL);
         let reach = 0.55;
         let key = |i: i64, j: i64| {
             (i as u64 & 0xff_ffff) | (j as u64 & 0xff_ffff) << 24 | (sign.triangles as u64) << 48
@@ -198,17 +200,19 @@ fn sort_into_classes(
                 };
                 for &class in list {
                     let other = classes[class as usize].prototype as usize;
-                    compared += 1;
-                    if compared <= MAX_COMPARED
-                        && found.is_none_or(|f| class < f)
-                        && sign.resembles(&signatures[other])
-                        && congruent(
-                            model,
-                            parts,
-                            (&leaves[index], sign),
-                            (&leaves[other], &signatures[other]),
-                        )
+                    if compared >= MAX_COMPARED
+                        || found.is_some_and(|f| class >= f)
+                        || !sign.resembles(&signatures[other])
                     {
+                        continue;
+                    }
+                    compared += 1;
+                    if congruent(
+                        model,
+                        parts,
+                        (&leaves[index], sign),
+                        (&leaves[other], &signatures[other]),
+                    ) {
                         found = Some(class);
                     }
                 }
