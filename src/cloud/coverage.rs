@@ -22,6 +22,8 @@ pub struct Coverage {
     pub invalid: f64,
     /// `A`: surface area of all faces, not projected.
     pub total: f64,
+    /// Surface area of valid faces, not projected.
+    pub within: f64,
     /// Area-weighted mean of squared distances to the nearest card, in normalised units squared.
     /// It tells candidates apart where all faces are invalid or all are valid.
     pub mean_square: f64,
@@ -82,6 +84,7 @@ pub fn coverage(foliage: &Foliage<'_>, cards: &[Card], epsilon: f64) -> Coverage
         let projected = face.projected(card.normal());
         if is_valid(face, card, cards, epsilon) {
             sum.valid += projected;
+            sum.within += area;
         } else {
             sum.invalid += projected;
         }
@@ -145,6 +148,7 @@ mod tests {
         close(c.valid, 2.0);
         close(c.invalid, 0.6);
         close(c.total, 3.0);
+        close(c.within, 2.0);
         close(c.covered(), 1.4);
         close(c.missed(), 1.6);
         close(c.quality(0.5), 0.7);

@@ -1,5 +1,6 @@
 //! STEP 3: billboards become levels of detail.
 
+pub mod adapt;
 pub mod element;
 pub mod level;
 pub mod merge;
