@@ -89,40 +89,75 @@ impl Representation {
     }
 }
 
-/// The candidate with the fewest triangles, the one that shows most of those.
-pub fn cheapest(candidates: &[Representation]) -> Option<&Representation> {
-    candidates.iter().min_by(|a, b| thrifty(a, b))
+/// What stands for a group, and whether it passes; `None` where the group has no faces. `sigma` is
+/// the group's mean visibility.
+pub fn represent(
+    foliage: &Foliage<'_>,
+    sigma: f64,
+    judgement: &Judgement,
+) -> Option<(Representation, bool)> {
+    let flat = plane_candidate(foliage, sigma, judgement)?;
+    // Nothing else costs as little: where the plane passes, no other candidate is made.
+    if flat.judged_error() <= judgement.tolerance {
+        return Some((flat, true));
+    }
+    let mut all = solid_candidates(foliage, sigma, judgement);
+    all.push(flat);
+    let (chosen, passes) = choose(&all, judgement.tolerance)?;
+    Some((chosen.clone(), passes))
 }
 
-/// All billboard candidates for a group; empty where it has no faces. `sigma` is the group's mean
-/// visibility.
-pub fn candidates(foliage: &Foliage<'_>, sigma: f64, judgement: &Judgement) -> Vec<Representation> {
-    let made = |generator, cards: Vec<Card>| {
-        let coverage = coverage(foliage, &cards, judgement.epsilon);
-        let triangles = cards.iter().map(Card::triangles).sum();
-        Representation {
-            generator,
-            cards,
-            triangles,
-            coverage,
-            sigma,
-        }
-    };
+/// The plane alone: the cheapest representation.
+pub fn plane_candidate(
+    foliage: &Foliage<'_>,
+    sigma: f64,
+    judgement: &Judgement,
+) -> Option<Representation> {
+    let cards = plane(foliage, judgement.outline)?;
+    Some(billboards(
+        Generator::Plane,
+        cards,
+        foliage,
+        sigma,
+        judgement,
+    ))
+}
+
+/// Cross and strip, where they can be made.
+fn solid_candidates(
+    foliage: &Foliage<'_>,
+    sigma: f64,
+    judgement: &Judgement,
+) -> Vec<Representation> {
     let sections = Sections {
         count: judgement.strip_sections,
         merge_error: judgement.epsilon * MERGE_TO_EPSILON,
     };
     // A strip of one section is a plane with less freedom.
     let band = strip(foliage, sections).filter(|cards| cards.len() > 1);
-    let billboards = [
-        (Generator::Plane, plane(foliage, judgement.outline)),
+    let made = [
         (Generator::Cross, cross(foliage, judgement.outline)),
         (Generator::Strip, band),
     ];
-    let made = billboards
-        .into_iter()
-        .filter_map(|(g, c)| Some(made(g, c?)));
-    made.collect()
+    made.into_iter()
+        .filter_map(|(g, cards)| Some(billboards(g, cards?, foliage, sigma, judgement)))
+        .collect()
+}
+
+fn billboards(
+    generator: Generator,
+    cards: Vec<Card>,
+    foliage: &Foliage<'_>,
+    sigma: f64,
+    judgement: &Judgement,
+) -> Representation {
+    Representation {
+        generator,
+        triangles: cards.iter().map(Card::triangles).sum(),
+        coverage: coverage(foliage, &cards, judgement.epsilon),
+        cards,
+        sigma,
+    }
 }
 
 /// The leaves themselves: they show all of their area, at their own cost.
@@ -144,7 +179,7 @@ pub fn geometry(foliage: &Foliage<'_>, sigma: f64) -> Representation {
 
 /// The candidate to take, and whether it passes: the cheapest that passes (the better of equals),
 /// else the one that shows the most visible area for its triangles.
-pub fn choose(candidates: &[Representation], tolerance: f64) -> Option<(&Representation, bool)> {
+fn choose(candidates: &[Representation], tolerance: f64) -> Option<(&Representation, bool)> {
     let passing = candidates
         .iter()
         .filter(|r| r.judged_error() <= tolerance)
@@ -195,8 +230,7 @@ mod tests {
             faces,
             connector: Vec3::new(-0.1, 0.0, 0.5),
         };
-        let all = candidates(&foliage, 1.0, &judgement(epsilon));
-        let (best, passes) = choose(&all, 0.1).unwrap();
+        let (best, passes) = represent(&foliage, 1.0, &judgement(epsilon)).unwrap();
         (best.generator, passes)
     }
 
@@ -239,11 +273,7 @@ mod tests {
             faces: &faces,
             connector: Vec3::ZERO,
         };
-        let plane = |sigma| {
-            let all = candidates(&foliage, sigma, &judgement(0.01));
-            let plane = all.into_iter().find(|r| r.generator == Generator::Plane);
-            plane.unwrap()
-        };
+        let plane = |sigma| plane_candidate(&foliage, sigma, &judgement(0.01)).unwrap();
         // No vertex is near the plane between the leaves: C = 0, the whole area is missed.
         let (seen, hidden) = (plane(1.0), plane(0.05));
         assert_eq!((seen.judged_error(), seen.quality()), (1.0, 0.0));
@@ -257,7 +287,7 @@ mod tests {
             faces: &[],
             connector: Vec3::ZERO,
         };
-        assert!(candidates(&none, 1.0, &judgement(0.1)).is_empty());
+        assert!(represent(&none, 1.0, &judgement(0.1)).is_none());
         assert!(choose(&[], 0.1).is_none());
         assert_eq!(geometry(&none, 1.0).judged_error(), 0.0);
     }

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::represent::{Judgement, Representation, candidates, cheapest, choose, geometry};
+use super::represent::{Judgement, Representation, geometry, plane_candidate, represent};
 use super::unit::Units;
 use super::{AdaptOptions, Group, SIZE_TO_EPSILON};
 use crate::botany::Tree;
@@ -143,22 +143,19 @@ impl Run {
             }
         }
         if self.triangles() > limit {
-            self.cheapen_all();
+            self.flatten_all();
         }
         best
     }
 
-    /// The last resort: the cheapest billboards for the groups that are left.
-    fn cheapen_all(&mut self) {
+    /// The last resort: one plane for each group that is left.
+    fn flatten_all(&mut self) {
         for at in self.cut().collect::<Vec<_>>() {
             let (foliage, sigma) = self.foliage(at);
-            let candidates = candidates(&foliage, sigma, &self.judgement);
-            if let (Some(cheapest), Some(judged)) = (
-                cheapest(&candidates).cloned(),
-                &mut self.judged[at as usize],
-            ) {
-                judged.passes = cheapest.judged_error() <= self.judgement.tolerance;
-                judged.representation = cheapest;
+            let flat = plane_candidate(&foliage, sigma, &self.judgement);
+            if let (Some(flat), Some(judged)) = (flat, &mut self.judged[at as usize]) {
+                judged.passes = flat.judged_error() <= self.judgement.tolerance;
+                judged.representation = flat;
             }
         }
     }
@@ -193,23 +190,24 @@ impl Run {
     fn judged_unit(&self, at: u32) -> Judged {
         let unit = &self.units.units[at as usize];
         let (foliage, sigma) = self.foliage(at);
-        let candidates = candidates(&foliage, sigma, &self.judgement);
-        let chosen = choose(&candidates, self.judgement.tolerance);
-        let leaf = || geometry(&foliage, sigma);
-        match chosen {
-            // A single leaf is kept where billboards fail or cost as much.
-            Some((r, passes))
-                if unit.children.is_some() || (passes && r.triangles < foliage.faces.len()) =>
-            {
-                Judged {
-                    representation: r.clone(),
-                    passes,
-                }
+        let leaves = || Judged {
+            representation: geometry(&foliage, sigma),
+            passes: true,
+        };
+        let single = unit.children.is_none();
+        if single && foliage.faces.len() <= 2 {
+            return leaves();
+        }
+        match represent(&foliage, sigma, &self.judgement) {
+            // A single leaf is kept where billboards fail or cost as much; a group is split.
+            Some((r, passes)) if single && (!passes || r.triangles >= foliage.faces.len()) => {
+                leaves()
             }
-            _ => Judged {
-                representation: leaf(),
-                passes: true,
+            Some((representation, passes)) => Judged {
+                passes: passes && representation.triangles <= foliage.faces.len(),
+                representation,
             },
+            None => leaves(),
         }
     }
 
