@@ -88,10 +88,15 @@ pub fn coverage(foliage: &Foliage<'_>, cards: &[Card], epsilon: f64) -> Coverage
         } else {
             sum.invalid += projected;
         }
+        // Each sample to its own nearest card: a long face may lie along several sections.
+        let apart = |p| {
+            let distances = cards.iter().map(|card| f64::from(card.distance(p)));
+            distances.fold(f64::MAX, f64::min).powi(2)
+        };
         square += face
             .samples()
             .iter()
-            .map(|&(p, weight)| weight * f64::from(card.distance(p)).powi(2))
+            .map(|&(p, weight)| weight * apart(p))
             .sum::<f64>();
     }
     sum.mean_square = match (cards.is_empty(), sum.total > 0.0) {
