@@ -182,3 +182,109 @@ fn threads_do_not_change_a_figure() {
     };
     assert_eq!(run(1), run(2));
 }
+
+#[test]
+fn a_level_is_also_measured_at_its_own_height_and_half_of_it() {
+    let (original, level) = (crown(200, 0), crown(200, 7));
+    let settings = Settings {
+        heights_px: vec![64],
+        own_heights_px: vec![None, Some(100)],
+        ..Settings::default()
+    };
+    let report = evaluate((&original, "a"), &[(&level, "b"), (&level, "c")], &settings);
+    let heights =
+        |i: usize| -> Vec<u32> { report.levels[i].sizes.iter().map(|s| s.height_px).collect() };
+    assert_eq!((heights(0), heights(1)), (vec![64], vec![100, 64, 50]));
+    // d = H * 1080 / (2 px tan 30 degrees)
+    let distance = original.height() as f64 * 1080.0 / (200.0 * 30f64.to_radians().tan());
+    assert!((report.levels[1].distance_m - distance).abs() < 1e-9);
+}
+
+/// three.js r187 in headless Chromium (SwiftShader, four samples) on the oak, from the ten views
+/// that `views(10, 11.0)` gives: F1 and covered area against the supersampled oak.
+#[test]
+fn the_client_is_what_three_js_shows() {
+    let folder = std::env::var("PLEACH_TREES")
+        .unwrap_or_else(|_| concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/trees").into());
+    let file = std::path::Path::new(&folder).join("ez_oak_medium.glb");
+    if !file.exists() {
+        println!("skipped: {} is not here", file.display());
+        return;
+    }
+    let oak = pleach::botany::load::load(&file).unwrap();
+    let drawable = Drawable::silhouette(&oak);
+    for (height_px, f1, area) in [(256, 0.9681, 0.9732), (128, 0.9219, 0.8899)] {
+        let reference = Reference::of(&drawable, &oak, &views(10, 11.0), height_px);
+        let client = reference.compare_client(&drawable);
+        assert!(
+            (client.f1.mean - f1).abs() < 0.003,
+            "{height_px}: {:?}",
+            client.f1
+        );
+        assert!(
+            (client.area_ratio.mean - area).abs() < 0.004,
+            "{height_px}: {:?}",
+            client.area_ratio
+        );
+    }
+}
+
+/// Runs `pleach evaluate` with these arguments.
+fn evaluate_command(arguments: &[&str]) -> std::process::Output {
+    std::process::Command::new(env!("CARGO_BIN_EXE_pleach"))
+        .arg("evaluate")
+        .args(arguments)
+        .output()
+        .unwrap()
+}
+
+#[test]
+fn the_command_prints_the_report_and_writes_it_with_pictures() {
+    let oak = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/oak.glb");
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("new/folder");
+    let level = format!("{oak}@32");
+    let arguments = [
+        oak, &level, "--json", "--client", "--height", "64", "--views", "4", "-o",
+    ];
+    let done = evaluate_command(&[&arguments[..], &[out.to_str().unwrap()]].concat());
+    assert!(
+        done.status.success(),
+        "{}",
+        String::from_utf8_lossy(&done.stderr)
+    );
+    let report: pleach::report::schema::Report = serde_json::from_slice(&done.stdout).unwrap();
+    let sizes = &report.levels[0].sizes;
+    assert_eq!(
+        sizes.iter().map(|s| s.height_px).collect::<Vec<_>>(),
+        [64, 32, 16]
+    );
+    assert!(
+        sizes
+            .iter()
+            .all(|s| s.f1.mean == 1.0 && s.client.is_some() && s.views.len() == 4)
+    );
+    let written = std::fs::read(out.join("report.json")).unwrap();
+    assert_eq!(written, done.stdout);
+    for picture in ["contact.png", "contact-client.png"] {
+        let sheet = image::open(out.join(picture)).unwrap().to_rgb8();
+        let tree = sheet.pixels().filter(|p| p.0 != [255; 3]).count();
+        assert!(tree > 1000, "{picture}: {tree} pixels");
+    }
+}
+
+#[test]
+fn the_command_refuses_what_it_cannot_read_or_measure() {
+    let oak = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/oak.glb");
+    for wrong in [
+        &[oak][..],
+        &[oak, "no-such-file.glb"],
+        &[oak, oak, "--height", "0"],
+        &[oak, oak, "--height", "64,-3"],
+        &[oak, oak, "--views", "0"],
+    ] {
+        let done = evaluate_command(wrong);
+        assert_eq!(done.status.code(), Some(2), "{wrong:?}");
+        assert!(!done.stderr.is_empty());
+    }
+}

@@ -15,9 +15,10 @@ use crate::space::view::View;
 pub struct Args {
     /// The original tree (.glb or .gltf).
     original: PathBuf,
-    /// The levels, nearest first.
-    #[arg(required = true)]
-    levels: Vec<PathBuf>,
+    /// The levels, nearest first. FILE@PIXELS: the tree's height from which a level is shown; it
+    /// is measured there and at half of it as well.
+    #[arg(required = true, value_name = "LEVEL[@PIXELS]")]
+    levels: Vec<String>,
     /// Folder for report.json and contact.png.
     #[arg(short, long)]
     output: Option<PathBuf>,
@@ -48,18 +49,16 @@ fn parse_views(text: &str) -> std::result::Result<usize, String> {
 /// Runs the command.
 pub fn run(args: &Args) -> Result<()> {
     let original = load(&args.original)?;
-    let levels: Vec<Model> = args
-        .levels
-        .iter()
-        .map(|file| load(file))
-        .collect::<Result<_>>()?;
+    let (files, own_heights_px) = split(&args.levels);
+    let levels: Vec<Model> = files.iter().map(|file| load(file)).collect::<Result<_>>()?;
     let settings = Settings {
         heights_px: args.height.clone(),
+        own_heights_px,
         views: args.views,
         azimuth_offset_deg: args.azimuth_offset,
         client: args.client,
     };
-    let names: Vec<String> = args.levels.iter().map(|file| file_name(file)).collect();
+    let names: Vec<String> = files.iter().map(|file| file_name(file)).collect();
     let named: Vec<(&Model, &str)> = levels
         .iter()
         .zip(&names)
@@ -75,6 +74,25 @@ pub fn run(args: &Args) -> Result<()> {
         print!("{}", table(&report));
     }
     Ok(())
+}
+
+/// Files and own heights of `FILE[@PIXELS]`.
+fn split(levels: &[String]) -> (Vec<PathBuf>, Vec<Option<u32>>) {
+    let (mut files, mut heights) = (Vec::new(), Vec::new());
+    for level in levels {
+        let parts = level.rsplit_once('@');
+        match parts.and_then(|(file, px)| Some((file, px.parse().ok()?))) {
+            Some((file, px @ 2..=4096)) => {
+                files.push(PathBuf::from(file));
+                heights.push(Some(px));
+            }
+            _ => {
+                files.push(PathBuf::from(level));
+                heights.push(None);
+            }
+        }
+    }
+    (files, heights)
 }
 
 fn file_name(file: &Path) -> String {

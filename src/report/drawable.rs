@@ -36,6 +36,9 @@ impl<'m> Drawable<'m> {
             .iter()
             .map(|source| {
                 let mut material = plain(source);
+                if never_cut(model, source) {
+                    material.cutoff = None;
+                }
                 let wanted = colors || material.cutoff.is_some();
                 if let Some(base) = source.base_color.filter(|_| wanted) {
                     let index = *made[base.image as usize].get_or_insert_with(|| {
@@ -90,6 +93,22 @@ fn plain(source: &model::Material) -> Material {
         double_sided: source.double_sided,
         ..Material::default()
     }
+}
+
+/// Whether alpha is tested in vain: a texture without holes, and no vertex colours to make any.
+fn never_cut(model: &Model, source: &model::Material) -> bool {
+    let cutoff = match source.alpha_mode {
+        AlphaMode::Opaque => return true,
+        AlphaMode::Mask => source.alpha_cutoff,
+        AlphaMode::Blend => BLEND_CUTOFF,
+    };
+    let solid = |texture: TextureRef| {
+        let image = &model.images[texture.image as usize];
+        image.rgba.iter().skip(3).step_by(4).all(|&a| a == 255)
+    };
+    model.colors.is_empty()
+        && source.base_color_factor[3] >= cutoff
+        && source.base_color.is_none_or(solid)
 }
 
 fn address(material: &mut Material, texture: u32, reference: &TextureRef) {

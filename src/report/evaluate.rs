@@ -15,6 +15,9 @@ use crate::space::view::{DEFAULT_VIEWS, View, views};
 pub struct Settings {
     /// Heights of the tree on the screen, pixels.
     pub heights_px: Vec<u32>,
+    /// For each level the height from which it is shown, pixels: it is measured there and at half
+    /// of it (twice the distance) as well. May be shorter than the list of levels.
+    pub own_heights_px: Vec<Option<u32>>,
     /// Number of views, the top included (at least; see [`views`]).
     pub views: usize,
     /// Azimuth of the first view, degrees.
@@ -27,6 +30,7 @@ impl Default for Settings {
     fn default() -> Self {
         Self {
             heights_px: vec![256, 64],
+            own_heights_px: Vec::new(),
             views: DEFAULT_VIEWS,
             azimuth_offset_deg: 0.0,
             client: false,
@@ -35,6 +39,14 @@ impl Default for Settings {
 }
 
 impl Settings {
+    /// The heights at which a level (counted from 0, without the original) is measured, largest first.
+    fn heights_of(&self, level: usize) -> Vec<u32> {
+        let own = self.own_heights_px.get(level).copied().flatten();
+        let mut heights = self.heights_px.clone();
+        heights.extend(own.into_iter().flat_map(|px| [px, px / 2]));
+        in_order(heights)
+    }
+
     /// The views that these settings ask for.
     pub fn view_set(&self) -> Vec<View> {
         views(self.views, self.azimuth_offset_deg)
@@ -67,17 +79,34 @@ pub fn evaluate(
             draw_calls: draw_calls(model),
             texture_bytes: texture_bytes(model),
             file_bytes: model.file_bytes,
-            distance_m: distance_m(original.0, settings),
             overdraw: overdraw(drawable, original.0, &views),
             ..Level::default()
         })
         .collect();
     for (number, row) in rows.iter_mut().skip(1).enumerate() {
         row.level = number as u32 + 1;
+        let own = settings.own_heights_px.get(number).copied().flatten();
+        if let Some(height_px) = own.or(settings.heights_px.first().copied()) {
+            row.distance_m = distance_m(original.0, height_px);
+        }
     }
-    for &height_px in &settings.heights_px {
+    let heights: Vec<Vec<u32>> = (0..levels.len())
+        .map(|level| settings.heights_of(level))
+        .collect();
+    let all = in_order(
+        heights
+            .iter()
+            .flatten()
+            .chain(&settings.heights_px)
+            .copied()
+            .collect(),
+    );
+    for height_px in all {
         let reference = Reference::of(&drawables[0], original.0, &views, height_px);
-        for (row, drawable) in rows.iter_mut().zip(&drawables) {
+        for (index, (row, drawable)) in rows.iter_mut().zip(&drawables).enumerate() {
+            if index > 0 && !heights[index - 1].contains(&height_px) {
+                continue;
+            }
             row.sizes
                 .push(measure(&reference, drawable, settings.client));
         }
@@ -98,11 +127,16 @@ fn measure(reference: &Reference, level: &Drawable, client: bool) -> SizeFigures
     figures
 }
 
-/// Distance at which the tree has the first height on the screen, metres.
-fn distance_m(original: &Model, settings: &Settings) -> f64 {
-    let Some(&height_px) = settings.heights_px.first() else {
-        return 0.0;
-    };
+/// Sorted from large to small, each once, none under a pixel.
+fn in_order(mut heights: Vec<u32>) -> Vec<u32> {
+    heights.retain(|&px| px > 0);
+    heights.sort_unstable_by(|a, b| b.cmp(a));
+    heights.dedup();
+    heights
+}
+
+/// Distance at which the tree has a height on the screen, metres.
+fn distance_m(original: &Model, height_px: u32) -> f64 {
     let height_m = original.height() as f64 * original.frame.radius;
     let half_angle = (FIELD_OF_VIEW_DEG / 2.0).to_radians();
     height_m * SCREEN_LINES / (2.0 * height_px as f64 * half_angle.tan())

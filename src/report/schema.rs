@@ -35,9 +35,9 @@ pub struct Level {
     pub texture_bytes: u64,
     /// Bytes of the file and what it refers to.
     pub file_bytes: u64,
-    /// Distance from which the level is shown, metres. Where the file was not baked here: the
-    /// distance at which the tree has the first size's height on a 1080-line screen with a
-    /// vertical field of view of 60 degrees.
+    /// Distance from which the level is shown, metres: where the tree has the level's own height
+    /// (or, where none is known, the first size asked for) on a 1080-line screen with a vertical
+    /// field of view of 60 degrees; 0 for the original.
     pub distance_m: f64,
     /// Fragments shaded (before alpha test, back faces culled) for each covered sample, mean over views.
     pub overdraw: f64,

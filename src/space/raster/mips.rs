@@ -33,12 +33,7 @@ pub(super) fn halved(finer: &Level) -> Level {
     } else {
         halve_rgb(finer, width, height)
     };
-    Level {
-        width,
-        height,
-        alpha,
-        rgb,
-    }
+    Level::new(width, height, alpha, rgb)
 }
 
 /// Averages alpha as it is, rounded.

@@ -14,6 +14,7 @@
 //!
 //! One call works on one thread and gives the same bits everywhere; callers spread views.
 
+mod blocks;
 mod camera;
 mod coverage;
 mod draw;

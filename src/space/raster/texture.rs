@@ -4,6 +4,7 @@
 //! (decoded from sRGB, not weighted by alpha), alpha as it is. Alpha lies in planes of its own, so
 //! that it can be replaced and drawn without touching colours.
 
+use super::blocks::Blocks;
 use super::mips;
 
 /// A sampler's wrap mode.
@@ -31,6 +32,7 @@ pub(super) struct Level {
     pub alpha: Vec<u8>,
     /// sRGB; empty where only alpha is wanted.
     pub rgb: Vec<[u8; 3]>,
+    blocks: Blocks,
 }
 
 impl Texture {
@@ -57,12 +59,7 @@ impl Texture {
     fn new(width: u32, height: u32, alpha: Vec<u8>, rgb: Vec<[u8; 3]>) -> Self {
         assert!(width > 0 && height > 0);
         assert_eq!(alpha.len(), width as usize * height as usize);
-        let mut levels = vec![Level {
-            width,
-            height,
-            alpha,
-            rgb,
-        }];
+        let mut levels = vec![Level::new(width, height, alpha, rgb)];
         while let Some(finer) = levels.last()
             && (finer.width > 1 || finer.height > 1)
         {
@@ -78,10 +75,12 @@ impl Texture {
     pub fn set_alpha(&mut self, alpha: &[u8]) {
         assert_eq!(alpha.len(), self.levels[0].alpha.len());
         self.levels[0].alpha.copy_from_slice(alpha);
+        self.levels[0].find_blocks();
         for i in 1..self.levels.len() {
             let (finer, rest) = self.levels.split_at_mut(i);
             let (finer, coarser) = (&finer[i - 1], &mut rest[0]);
             mips::halve_alpha(finer, coarser.width, coarser.height, &mut coarser.alpha);
+            coarser.find_blocks();
         }
     }
 
@@ -135,6 +134,7 @@ pub(super) struct Mip<'a> {
 
 impl Mip<'_> {
     /// Alpha (0 to 1) at `uv`.
+    #[inline]
     pub fn alpha(&self, uv: [f32; 2], address: Address) -> f32 {
         let fine = self.finer.alpha_at(uv, address);
         let fixed = match self.coarser {
@@ -158,32 +158,62 @@ impl Mip<'_> {
 }
 
 impl Level {
-    /// The four texels around `uv` (left above, right above, left below, right below) and the
-    /// weights of the right and lower ones in 256ths, the grain of graphics processors.
+    pub fn new(width: u32, height: u32, alpha: Vec<u8>, rgb: Vec<[u8; 3]>) -> Self {
+        Self {
+            width,
+            height,
+            blocks: Blocks::new(width, height, &alpha),
+            alpha,
+            rgb,
+        }
+    }
+
+    fn find_blocks(&mut self) {
+        self.blocks = Blocks::new(self.width, self.height, &self.alpha);
+    }
+
+    /// Where `uv` lies: the texel to the left above, and how far from its middle in 256ths.
     #[inline]
-    fn around(&self, [u, v]: [f32; 2], address: Address) -> ([usize; 4], [u32; 2]) {
+    fn place(&self, [u, v]: [f32; 2], address: Address) -> ([i32; 2], [u32; 2]) {
         let (mut x, mut y) = (fixed(u, self.width), fixed(v, self.height));
         if !address.linear {
             // To the middle of the texel that holds the point: its neighbours weigh nothing.
             (x, y) = ((x + 128) & !255, (y + 128) & !255);
         }
-        let weights = [(x & 255) as u32, (y & 255) as u32];
-        let (x, y, width) = (x >> 8, y >> 8, self.width as usize);
+        ([x >> 8, y >> 8], [(x & 255) as u32, (y & 255) as u32])
+    }
+
+    /// Whether a texel and its neighbours to the right and below are all inside.
+    #[inline]
+    fn holds(&self, [x, y]: [i32; 2]) -> bool {
+        x >= 0 && y >= 0 && x + 1 < self.width as i32 && y + 1 < self.height as i32
+    }
+
+    /// A texel and its neighbours: left above, right above, left below, right below.
+    #[inline]
+    fn neighbours(&self, [x, y]: [i32; 2], address: Address) -> [usize; 4] {
+        let width = self.width as usize;
         // Nearly every sample lies inside the image, and divisions are dear.
-        if x >= 0 && y >= 0 && x + 1 < self.width as i32 && y + 1 < self.height as i32 {
+        if self.holds([x, y]) {
             let at = y as usize * width + x as usize;
-            return ([at, at + 1, at + width, at + width + 1], weights);
+            return [at, at + 1, at + width, at + width + 1];
         }
         let [left, right] = [x, x + 1].map(|x| address.wrap[0].apply(x, self.width));
         let [above, below] = [y, y + 1].map(|y| address.wrap[1].apply(y, self.height) * width);
-        let texels = [above + left, above + right, below + left, below + right];
-        (texels, weights)
+        [above + left, above + right, below + left, below + right]
     }
 
-    /// Alpha in units of 1 / (255 * 65536), exact in 24 bits.
+    /// Alpha in units of 1 / (255 * 65536), exact in 24 bits. Weights have 256 steps, as on
+    /// graphics processors.
     #[inline]
     fn alpha_at(&self, uv: [f32; 2], address: Address) -> f32 {
-        let (texels, [right, below]) = self.around(uv, address);
+        let (texel, [right, below]) = self.place(uv, address);
+        if self.holds(texel)
+            && let Some(alpha) = self.blocks.get(texel[0], texel[1])
+        {
+            return (alpha as u32 * 65_536) as f32;
+        }
+        let texels = self.neighbours(texel, address);
         let [a, b, c, d] = texels.map(|i| self.alpha[i] as u32);
         let top = a * (256 - right) + b * right;
         let bottom = c * (256 - right) + d * right;
@@ -194,9 +224,9 @@ impl Level {
         if self.rgb.is_empty() {
             return [1.0; 3];
         }
-        let (texels, [right, below]) = self.around(uv, address);
+        let (texel, [right, below]) = self.place(uv, address);
         let (right, below) = (right as f32 / 256.0, below as f32 / 256.0);
-        let texels = texels.map(|i| self.rgb[i]);
+        let texels = self.neighbours(texel, address).map(|i| self.rgb[i]);
         std::array::from_fn(|channel| {
             let [a, b, c, d] = texels.map(|t| mips::light(t[channel]));
             let (top, bottom) = (a + (b - a) * right, c + (d - c) * right);
