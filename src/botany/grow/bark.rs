@@ -45,8 +45,8 @@ pub(super) fn paint_bark(bark: &Bark) -> [Painted; 2] {
 /// The relief, 0 (deep) to 1 (high), row by row.
 fn relief(pattern: Pattern) -> Vec<f32> {
     let warp = Noise::new(1, 4, 6);
-    let ridge = Noise::new(2, 14, 4);
-    let break_up = Noise::new(3, 18, 26);
+    let ridge = Noise::new(2, 22, 4);
+    let break_up = Noise::new(3, 16, 18);
     let grain = Noise::new(4, 48, 40);
     let plates = Noise::new(8, 9, 14);
     let marks = Noise::new(9, 5, 44);
@@ -58,10 +58,13 @@ fn relief(pattern: Pattern) -> Vec<f32> {
             let g = grain.at(u, v);
             let h = match pattern {
                 Pattern::Furrowed => {
-                    let line = 1.0 - (2.0 * ridge.at(u + w, v + 0.4 * w) - 1.0).abs();
-                    // Noise is near one half most often: there the furrows run.
-                    let furrow = smooth(1.0 - line, 0.06, 0.5);
-                    furrow * (0.72 + 0.28 * break_up.at(u, v)) * (0.85 + 0.15 * g)
+                    // Noise passes one half along lines: there the furrows run, long and upright,
+                    // and cross cracks break the ridges into plates.
+                    let furrow = (2.0 * ridge.at(u + w, v + 0.3 * w) - 1.0).abs();
+                    let crack = (2.0 * break_up.at(u + 0.5 * w, v + w) - 1.0).abs();
+                    let plate =
+                        smooth(furrow, 0.02, 0.38) * (0.55 + 0.45 * smooth(crack, 0.0, 0.2));
+                    plate * (0.75 + 0.25 * g)
                 }
                 Pattern::Scaly => {
                     let edge = (2.0 * plates.at(u + w, v) - 1.0).abs();

@@ -8,7 +8,7 @@ use super::mesh::Mesh;
 use super::paint::Painted;
 use super::species::Species;
 use super::stem::Stem;
-use super::{Foliage, Nodes, Options, Wood, bark, tube};
+use super::{Foliage, Nodes, Options, Wood, bark, skin, tube};
 use crate::space::glb::GlbBuilder;
 use crate::{Error, Result};
 
@@ -83,28 +83,31 @@ pub(super) fn write(
 }
 
 fn add_wood(parts: &mut Parts, species: &Species, options: &Options, stems: &[Stem]) -> usize {
-    let mut all = Mesh::default();
-    let mut count = 0;
-    for (i, stem) in stems.iter().enumerate() {
-        let mut mesh = tube::tube(species, stem);
-        if options.wood == Wood::Soup {
-            mesh = mesh.into_soup();
+    let meshes: Vec<Mesh> = match options.wood {
+        Wood::Skin => skin::skin(species, stems),
+        Wood::Tubes => stems.iter().map(|s| tube::tube(species, s)).collect(),
+        Wood::Soup => {
+            let tubes = stems.iter().map(|s| tube::tube(species, s));
+            tubes.map(Mesh::into_soup).collect()
         }
-        count += mesh.triangles.len();
-        match options.nodes {
-            Nodes::One => all.append(&mesh),
-            Nodes::Many => {
-                let origin = stem.points[0];
-                let name = format!("{}_branch_{i}", species.name);
-                let mesh = parts.mesh(&name, &mesh.relative_to(origin), BARK);
-                parts.node(&name, mesh)["translation"] = json!(origin.to_array());
-            }
+    };
+    let count = meshes.iter().map(|m| m.triangles.len()).sum();
+    // A skin is one piece, so it stays in one node.
+    if options.nodes == Nodes::One || options.wood == Wood::Skin {
+        let mut all = Mesh::default();
+        for mesh in &meshes {
+            all.append(mesh);
         }
-    }
-    if options.nodes == Nodes::One {
         let name = format!("{}_wood", species.name);
         let mesh = parts.mesh(&name, &all, BARK);
         parts.node(&name, mesh);
+        return count;
+    }
+    for (i, (mesh, stem)) in meshes.into_iter().zip(stems).enumerate() {
+        let origin = stem.points[0];
+        let name = format!("{}_branch_{i}", species.name);
+        let mesh = parts.mesh(&name, &mesh.relative_to(origin), BARK);
+        parts.node(&name, mesh)["translation"] = json!(origin.to_array());
     }
     count
 }

@@ -12,8 +12,11 @@ mod mesh;
 mod outline;
 mod paint;
 mod rng;
+mod skin;
 mod species;
 mod stem;
+#[cfg(test)]
+mod tests;
 mod truth;
 mod tube;
 
@@ -154,10 +157,14 @@ fn branch_scales(species: &Species, amount: Option<(u32, f32)>) -> Vec<f32> {
     let ratio = amount.map_or(1.0, |(_, ratio)| ratio);
     let n = species.levels.len();
     (0..n)
-        .map(|level| match n - level {
-            1 => rng::pow(ratio, 0.6),
-            2 => rng::pow(ratio, 0.2),
-            _ => 1.0,
+        .map(|level| {
+            let scale = match n - level {
+                1 => rng::pow(ratio, 0.6),
+                2 => rng::pow(ratio, 0.2),
+                _ => 1.0,
+            };
+            // One branch stays, or leaves had nothing to hang on.
+            scale.max(1.0 / species.levels[level].branches.max(1.0))
         })
         .collect()
 }

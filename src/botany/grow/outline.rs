@@ -16,8 +16,8 @@ pub(super) fn half_width(outline: Outline, t: f32) -> f32 {
             0.31 * bow(1.25) * (0.42 + 0.58 * pow(wave, 0.7))
         }
         Outline::Ovate => 0.36 * bow(0.72),
-        Outline::Lance => 0.085 * bow(0.8),
-        Outline::Needle => 0.035 * bow(1.0).max(if t < 0.9 { 0.4 } else { 0.0 }),
+        Outline::Lance => 0.1 * bow(0.8),
+        Outline::Needle => 0.028 * bow(1.0),
         Outline::Blade => 0.05 * bow(0.6),
     }
 }
@@ -68,17 +68,21 @@ pub(super) fn sprig(outline: Outline, count: u32) -> Sprig {
     let mut rng = Rng::new(7, u64::from(count));
     let mut leaves = Vec::new();
     let pairs = count.saturating_sub(1);
-    let stalk = if count > 1 { 0.6 } else { 0.0 };
+    let needle = outline == Outline::Needle;
+    let stalk = match count {
+        1 => 0.0,
+        _ if needle => 0.82,
+        _ => 0.6,
+    };
     for i in 0..pairs {
         let t = (i as f32 + 0.3) / pairs as f32;
         let side = if i % 2 == 0 { 1.0 } else { -1.0 };
-        let needle = outline == Outline::Needle;
         let lean = if needle {
             52.0 - 22.0 * t
         } else {
             68.0 - 34.0 * t
         } + 6.0 * rng.sway();
-        let size = if needle { 0.30 } else { 0.56 - 0.16 * t } * (1.0 + 0.12 * rng.sway());
+        let size = if needle { 0.26 } else { 0.56 - 0.16 * t } * (1.0 + 0.12 * rng.sway());
         let (sin, cos) = sin_cos(side * lean);
         leaves.push(Placed {
             base: Vec2::new(0.0, stalk * if needle { t } else { 0.12 + 0.86 * t }),
@@ -101,7 +105,7 @@ pub(super) fn sprig(outline: Outline, count: u32) -> Sprig {
     })
 }
 
-/// Scales a sprig to length one and finds its card, a fiftieth wider than the leaves.
+/// Scales a sprig to length one and finds its card, a little wider than the leaves.
 fn bounded(mut sprig: Sprig) -> Sprig {
     let points: Vec<Vec2> = sprig
         .leaves
@@ -121,7 +125,7 @@ fn bounded(mut sprig: Sprig) -> Sprig {
     let low = points.iter().fold(Vec2::MAX, |a, &p| a.min(p)) * scale;
     let high = points.iter().fold(Vec2::MIN, |a, &p| a.max(p)) * scale;
     // The twig stays in the middle of the card: half of all cards are mirrored.
-    let half = 1.02 * high.x.max(-low.x);
+    let half = 1.02 * high.x.max(-low.x) + 0.008;
     sprig.low = Vec2::new(-half, low.y.min(0.0));
     sprig.high = Vec2::new(half, 1.0);
     sprig

@@ -32,7 +32,7 @@ impl Painted {
         } else {
             png::ColorType::Rgb
         });
-        encoder.set_compression(png::Compression::High);
+        encoder.set_compression(png::Compression::Balanced);
         let mut writer = encoder.write_header()?;
         writer.write_image_data(&self.texels)?;
         writer.finish()?;

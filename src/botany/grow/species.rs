@@ -199,7 +199,8 @@ impl Shape {
     /// Relative length of a branch; `ratio` is 1 at the crown's foot and 0 at its top.
     pub(super) fn ratio(self, ratio: f32) -> f32 {
         match self {
-            Self::Conical => 0.2 + 0.8 * ratio,
+            // Weber and Penn have 0.2 + 0.8 ratio: too blunt a top for a spruce.
+            Self::Conical => 0.05 + 0.95 * ratio,
             Self::Spherical => 0.2 + 0.8 * sin_cos(180.0 * ratio).0,
             Self::Hemispherical => 0.2 + 0.8 * sin_cos(90.0 * ratio).0,
             Self::Cylindrical => 1.0,

@@ -86,8 +86,9 @@ impl Surface {
     }
 }
 
-/// The rings of a stem at its points; axes are carried along without twist.
-pub(super) fn rings(stem: &Stem) -> Vec<Ring> {
+/// The rings of a stem at its points; axes are carried along without twist. The first axis looks
+/// towards `seam`.
+pub(super) fn rings(stem: &Stem, seam: Option<Vec3>) -> Vec<Ring> {
     let n = stem.points.len();
     let tangent = |i: usize| {
         let (a, b) = (
@@ -96,7 +97,11 @@ pub(super) fn rings(stem: &Stem) -> Vec<Ring> {
         );
         (b - a).normalize_or(Vec3::Y)
     };
-    let mut u = across(tangent(0));
+    let towards = |seam: Vec3| {
+        let away = seam - stem.points[0];
+        (away - tangent(0) * away.dot(tangent(0))).try_normalize()
+    };
+    let mut u = seam.and_then(towards).unwrap_or(across(tangent(0)));
     (0..n)
         .map(|i| {
             let t = tangent(i);
@@ -114,11 +119,33 @@ pub(super) fn rings(stem: &Stem) -> Vec<Ring> {
         .collect()
 }
 
+/// The ring at a distance from the stem's base.
+pub(super) fn ring_at(rings: &[Ring], along: f32) -> Ring {
+    let i = rings.partition_point(|r| r.along <= along);
+    let (a, b) = match (rings.get(i.wrapping_sub(1)), rings.get(i)) {
+        (Some(a), Some(b)) => (a, b),
+        (Some(a), None) => return *a,
+        _ => return rings[0],
+    };
+    let t = (along - a.along) / (b.along - a.along).max(1e-9);
+    let [ta, tb] = [a, b].map(|r| r.axes[0].cross(r.axes[1]));
+    let forward = ta.lerp(tb, t).normalize_or(ta);
+    let u = a.axes[0].lerp(b.axes[0], t);
+    let u = (u - forward * u.dot(forward)).normalize_or(a.axes[0]);
+    Ring {
+        center: a.center.lerp(b.center, t),
+        axes: [u, forward.cross(u)],
+        radius: a.radius + (b.radius - a.radius) * t,
+        along,
+        slope: a.slope + (b.slope - a.slope) * t,
+    }
+}
+
 /// A stem as a tube, open where it is embedded, closed at the tip.
 pub(super) fn tube(species: &Species, stem: &Stem) -> Mesh {
     let surface = Surface::new(species, stem);
     let mut mesh = Mesh::default();
-    let rings = rings(stem);
+    let rings = rings(stem, None);
     let mut below: Option<u32> = None;
     for ring in &rings {
         let first = surface.add_ring(&mut mesh, ring);
