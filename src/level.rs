@@ -5,7 +5,7 @@ use glam::Vec2;
 use crate::botany::model::Material;
 use crate::botany::tree::Tree;
 use crate::cloud::Outline;
-use crate::detail::element::Element;
+use crate::detail::element::{Element, mean_radius};
 use crate::detail::level::{LevelPlan, Planner};
 use crate::detail::merge::Hierarchy;
 use crate::detail::optimal_cut::Choice;
@@ -90,16 +90,19 @@ impl Baker<'_> {
             },
         };
         let whole = request.triangles <= WHOLE_TREE_TRIANGLES;
-        let plan = if whole {
+        let cut = if whole {
+            None
+        } else {
+            planner.plan(request.triangles)
+        };
+        let plan = cut.unwrap_or_else(|| {
             whole_tree(
                 &self.tree.model,
                 self.elements,
                 &self.radii(),
                 request.triangles,
             )
-        } else {
-            planner.plan(request.triangles)
-        };
+        });
         let mut scene = self.wood(&plan, height_px);
         // Levels are looked at from nearer than they are made for: never fewer texels than this.
         let texels_px = if whole {
@@ -178,15 +181,7 @@ impl Baker<'_> {
 
     /// Mean radius of each element that is wood; 0 for leaves.
     fn radii(&self) -> Vec<f32> {
-        let skeleton = &self.tree.skeleton;
-        let mean = |chain: u32| {
-            let nodes = &skeleton.chains[chain as usize].nodes;
-            let sum: f32 = nodes
-                .iter()
-                .map(|&n| skeleton.nodes[n as usize].radius)
-                .sum();
-            sum / nodes.len().max(1) as f32
-        };
+        let mean = |chain| mean_radius(self.tree, chain);
         self.elements
             .iter()
             .map(|e| e.chain.map_or(0.0, mean))

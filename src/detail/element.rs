@@ -6,8 +6,10 @@
 
 use glam::Vec3;
 
-use crate::botany::model::{AlphaMode, Model};
+use super::opaque::Opaque;
+use crate::botany::model::Model;
 use crate::botany::tree::{NO_NODE, Organ, Tree};
+use crate::cloud::occlusion::Occlusion;
 use crate::space::eigen::Moments;
 
 /// Triangles of one leaf belong to one element while their normals differ by less than this
@@ -19,21 +21,66 @@ const SAME_SHEET_COSINE: f32 = 0.6;
 pub struct Element {
     /// Triangles of the model.
     pub triangles: Vec<u32>,
-    /// Moments of its surface, weighted by area (opaque share included), normalised units.
+    /// Moments of its surface, weighted by area (opaque share only) times visibility, normalised
+    /// units.
     pub moments: Moments,
     /// Area-weighted centre.
     pub center: Vec3,
-    /// Surface area, one side, opaque share only, normalised units squared.
-    pub area: f32,
+    /// Points whose convex hull holds all that is opaque; empty for wood: its triangles' corners.
+    pub outline: Vec<Vec3>,
+    /// Wood so thick that it vanishes visibly where a card stands edge-on: never on a card.
+    pub solid: bool,
     /// The skeleton chain, where the element is wood.
     pub chain: Option<u32>,
     /// The sub-tree that it belongs to (index into [`Tree::subtrees`]).
     pub subtree: u32,
 }
 
+/// Mean radius over the tree's height from which a branch is solid: two pixels wide where the tree
+/// is 256 pixels high.
+const SOLID_SHARE: f32 = 0.004;
+
+/// Weight of what is fully hidden; what is fully visible weighs 1. Not zero, because the metaball
+/// field knows no direction: what it calls hidden is seen from some.
+const HIDDEN_WEIGHT: f64 = 0.3;
+
+/// Kratt's view-independent visibility: metaball occlusion from the leaves (section 3.4).
+struct Visible(Option<Occlusion>);
+
+impl Visible {
+    fn of(tree: &Tree) -> Self {
+        let centers: Vec<Vec3> = tree.leaves.iter().map(|l| l.center).collect();
+        Self((!centers.is_empty()).then(|| Occlusion::of_leaves(&centers, tree.model.height())))
+    }
+
+    fn weight(&self, at: Vec3) -> f64 {
+        let sigma = self.0.as_ref().map_or(1.0, |o| o.sigma(at));
+        HIDDEN_WEIGHT + (1.0 - HIDDEN_WEIGHT) * sigma
+    }
+}
+
+impl Element {
+    fn scale(&mut self, factor: f64) {
+        self.moments.weight *= factor;
+        self.moments.scatter *= factor;
+    }
+}
+
+/// Mean radius of a chain, normalised units.
+pub fn mean_radius(tree: &Tree, chain: u32) -> f32 {
+    let nodes = &tree.skeleton.chains[chain as usize].nodes;
+    let sum: f32 = nodes
+        .iter()
+        .map(|&n| tree.skeleton.nodes[n as usize].radius)
+        .sum();
+    sum / nodes.len().max(1) as f32
+}
+
 /// Splits a tree into elements: foliage first, in the order of the leaves, then wood by chain.
 pub fn elements(tree: &Tree) -> Vec<Element> {
-    let opacity = opaque_share(tree);
+    let opacity = Opaque::of(tree);
+    let visible = Visible::of(tree);
+    let solid_radius = SOLID_SHARE * tree.model.height();
     let subtree_of_chain = subtree_of_chain(tree);
     let mut out = Vec::with_capacity(tree.leaves.len() * 2);
     for leaf in &tree.leaves {
@@ -42,19 +89,26 @@ pub fn elements(tree: &Tree) -> Vec<Element> {
             node => subtree_of_chain[tree.skeleton.nodes[node as usize].chain as usize],
         };
         for sheet in sheets(&tree.model, &leaf.triangles) {
-            out.push(element(&tree.model, sheet, &opacity, None, subtree));
+            let mut leaf = element(&tree.model, sheet, &opacity, None, subtree);
+            leaf.scale(visible.weight(leaf.center));
+            out.push(leaf);
         }
     }
     for (chain, triangles) in wood_by_chain(tree).into_iter().enumerate() {
         if !triangles.is_empty() {
             let subtree = subtree_of_chain[chain];
-            let chain = Some(chain as u32);
-            let mut wood = element(&tree.model, triangles, &opacity, chain, subtree);
+            let mut wood = element(
+                &tree.model,
+                triangles,
+                &opacity,
+                Some(chain as u32),
+                subtree,
+            );
             // A tube of surface S covers S/4 in the mean over all directions, as a leaf of
             // one-sided area S/2 does (Cauchy): wood and leaves then weigh alike.
-            wood.moments.weight *= 0.5;
-            wood.moments.scatter *= 0.5;
-            wood.area *= 0.5;
+            wood.scale(0.5);
+            wood.scale(visible.weight(wood.center));
+            wood.solid = mean_radius(tree, chain as u32) > solid_radius;
             out.push(wood);
         }
     }
@@ -85,19 +139,27 @@ pub fn wood_by_chain(tree: &Tree) -> Vec<Vec<u32>> {
 fn element(
     model: &Model,
     triangles: Vec<u32>,
-    opacity: &[f32],
+    opacity: &Opaque,
     chain: Option<u32>,
     subtree: u32,
 ) -> Element {
     let mut moments = Moments::default();
     for &t in &triangles {
         let corners = model.corners(t);
-        let area = triangle_area(corners) * f64::from(opacity[t as usize]);
+        let area = triangle_area(corners) * f64::from(opacity.share(t));
         moments.add_triangle(corners, area);
     }
     let center = moments.mean.as_vec3();
+    let outline = match chain {
+        Some(_) => Vec::new(),
+        None => triangles
+            .iter()
+            .flat_map(|&t| opacity.outline(model, t))
+            .collect(),
+    };
     Element {
-        area: moments.weight as f32,
+        outline,
+        solid: false,
         triangles,
         moments,
         center,
@@ -157,42 +219,4 @@ fn sheets(model: &Model, triangles: &[u32]) -> Vec<Vec<u32>> {
         }
     }
     sheets.into_iter().map(|(_, sheet)| sheet).collect()
-}
-
-/// For each triangle the share of its surface that is opaque, from 28 points of its texture.
-fn opaque_share(tree: &Tree) -> Vec<f32> {
-    use rayon::prelude::*;
-    let model = &tree.model;
-    (0..model.triangles.len() as u32)
-        .into_par_iter()
-        .map(|t| {
-            let material = model.material_of(t);
-            let Some(texture) = material.base_color else {
-                return 1.0;
-            };
-            if material.alpha_mode == AlphaMode::Opaque {
-                return 1.0;
-            }
-            let image = &model.images[texture.image as usize];
-            let uvs = &model.uvs[texture.uv_set as usize];
-            let corner = model.triangles[t as usize].map(|i| uvs[i as usize]);
-            let cutoff = crate::space::texture::cutoff(material);
-            let (mut opaque, mut all) = (0, 0);
-            const STEPS: usize = 7;
-            for i in 0..STEPS {
-                for j in 0..STEPS - i {
-                    let (s, t) = (
-                        (i as f32 + 0.33) / STEPS as f32,
-                        (j as f32 + 0.33) / STEPS as f32,
-                    );
-                    let uv = corner[0] + (corner[1] - corner[0]) * s + (corner[2] - corner[0]) * t;
-                    let texel = crate::space::texture::nearest(image, texture.wrap, uv);
-                    opaque += u32::from(f32::from(texel[3]) / 255.0 >= cutoff);
-                    all += 1;
-                }
-            }
-            // Never zero: a leaf whose sample points all miss still has its place.
-            (opaque as f32 / all as f32).max(0.02)
-        })
-        .collect()
 }

@@ -42,8 +42,9 @@ pub struct Planner<'a> {
 }
 
 impl Planner<'_> {
-    /// The best level of at most `budget` triangles.
-    pub fn plan(&self, budget: u64) -> LevelPlan {
+    /// The best level of at most `budget` triangles; `None` where even the coarsest cut has more
+    /// (each thick branch needs a tube of its own).
+    pub fn plan(&self, budget: u64) -> Option<LevelPlan> {
         let pruning = Pruning {
             hierarchy: self.hierarchy,
             card_error: &self.hierarchy.error,
@@ -55,6 +56,9 @@ impl Planner<'_> {
             choices: self.choices,
         };
         let cut = pruning.cut(budget);
+        if cut.triangles > budget {
+            return None;
+        }
         let mut plan = LevelPlan {
             error: cut.error,
             ..LevelPlan::default()
@@ -67,7 +71,7 @@ impl Planner<'_> {
         }
         reassign(self.elements, &mut plan.members, self.reassign);
         plan.cards = plan.members.par_iter().map(|m| self.card(m)).collect();
-        plan
+        Some(plan)
     }
 
     fn card(&self, members: &[u32]) -> CardGroup {
@@ -80,7 +84,12 @@ impl Planner<'_> {
             .flat_map(|&e| self.elements[e as usize].triangles.iter().copied())
             .collect();
         let (u, v) = plane_axes(&moments);
-        let points = triangles.iter().flat_map(|&t| self.model.corners(t));
+        let leaves = members.iter().map(|&e| &self.elements[e as usize]);
+        let points = leaves.flat_map(|e| {
+            let wood = e.triangles.iter().filter(|_| e.outline.is_empty());
+            let corners = wood.flat_map(|&t| self.model.corners(t));
+            e.outline.iter().copied().chain(corners)
+        });
         let card = Card::around(moments.mean.as_vec3(), u, v, points, self.outline);
         CardGroup { card, triangles }
     }

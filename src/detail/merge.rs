@@ -106,8 +106,9 @@ pub fn merge(elements: &[Element], locality: f64) -> Hierarchy {
     let n = elements.len();
     let mut moments: Vec<Moments> = elements.iter().map(|e| e.moments).collect();
     let mut error: Vec<f64> = moments.iter().map(|m| plane_error(m, locality)).collect();
+    let solid = |i: u32| elements.get(i as usize).is_some_and(|e| e.solid);
     let centers: Vec<Vec3> = elements.iter().map(|e| e.center).collect();
-    let mut near = symmetric(nearest_neighbours(&centers, NEIGHBOURS));
+    let mut near = neighbours(elements, &centers);
     let mut alive = vec![true; n];
     let mut merges = Vec::with_capacity(n);
     let mut heap = BinaryHeap::new();
@@ -152,9 +153,15 @@ pub fn merge(elements: &[Element], locality: f64) -> Hierarchy {
         }
         // The neighbourhood graph may fall into pieces: join each piece to the ones nearest.
         let roots: Vec<u32> = (0..moments.len() as u32)
-            .filter(|&i| alive[i as usize])
+            .filter(|&i| alive[i as usize] && !solid(i))
             .collect();
         if roots.len() < 2 {
+            // Solid wood has no card: whatever its own choices cost is less than infinite.
+            let alone = (0..n as u32).filter(|&i| solid(i));
+            let roots = roots.into_iter().chain(alone.clone()).collect();
+            for i in alone {
+                error[i as usize] = f64::INFINITY;
+            }
             return Hierarchy {
                 elements: n,
                 merges,
@@ -176,6 +183,19 @@ pub fn merge(elements: &[Element], locality: f64) -> Hierarchy {
             }
         }
     }
+}
+
+/// The nearest elements of each, both ways; solid elements have none.
+fn neighbours(elements: &[Element], centers: &[Vec3]) -> Vec<Vec<u32>> {
+    let soft: Vec<u32> = (0..elements.len() as u32)
+        .filter(|&i| !elements[i as usize].solid)
+        .collect();
+    let at: Vec<Vec3> = soft.iter().map(|&i| centers[i as usize]).collect();
+    let mut near = vec![Vec::new(); elements.len()];
+    for (from, list) in nearest_neighbours(&at, NEIGHBOURS).into_iter().enumerate() {
+        near[soft[from] as usize] = list.into_iter().map(|j| soft[j as usize]).collect();
+    }
+    symmetric(near)
 }
 
 fn symmetric(mut near: Vec<Vec<u32>>) -> Vec<Vec<u32>> {

@@ -4,6 +4,7 @@ pub mod adapt;
 pub mod element;
 pub mod level;
 pub mod merge;
+pub mod opaque;
 pub mod optimal_cut;
 pub mod reassign;
 pub mod whole_tree;

@@ -45,16 +45,20 @@ impl Plane {
 pub fn whole_tree(model: &Model, elements: &[Element], radius: &[f32], budget: u64) -> LevelPlan {
     let cards = (budget / 2).clamp(3, 64) as usize;
     let level = ((cards as f64 * LEVEL_SHARE).round() as usize).max(1);
-    let upright = upright_planes(elements, cards - level);
-    let level = level_planes(elements, level);
     let thick = |e: usize| elements[e].chain.is_some() && radius[e] > THICK_SHARE * model.height();
+    let trunk: Moments = (0..elements.len())
+        .filter(|&e| thick(e))
+        .fold(Moments::default(), |m, e| m.merged(&elements[e].moments));
+    let through = (trunk.weight > 0.0 && cards - level >= 3).then_some(trunk.mean);
+    let upright = upright_planes(elements, cards - level, through);
+    let level = level_planes(elements, level);
     let mut members = vec![Vec::new(); upright.len() + level.len()];
     for (e, element) in elements.iter().enumerate() {
         let nearest = nearest(&upright, element);
-        if thick(e) {
-            for plane in crossing(&upright, element) {
-                members[plane].push(e as u32);
-            }
+        if thick(e) && through.is_some() {
+            // The first two planes cross at the trunk.
+            members[0].push(e as u32);
+            members[1].push(e as u32);
         } else {
             members[nearest].push(e as u32);
         }
@@ -120,22 +124,9 @@ fn nearest(planes: &[Plane], element: &Element) -> usize {
     best.1
 }
 
-/// The nearest upright plane and the best of those that stand more than 45 degrees across it.
-fn crossing(planes: &[Plane], element: &Element) -> Vec<usize> {
-    let first = nearest(planes, element);
-    let across = (0..planes.len())
-        .filter(|&i| {
-            planes[i].normal.dot(planes[first].normal).abs() < std::f64::consts::FRAC_1_SQRT_2
-        })
-        .min_by(|&a, &b| {
-            let cost = |i: usize| planes[i].cost(&element.moments, 0.02);
-            cost(a).total_cmp(&cost(b)).then(a.cmp(&b))
-        });
-    std::iter::once(first).chain(across).collect()
-}
-
-/// Planes with horizontal normals, fitted to all elements by alternating assignment and fit.
-fn upright_planes(elements: &[Element], count: usize) -> Vec<Plane> {
+/// Planes with horizontal normals, fitted to all elements by alternating assignment and fit. With
+/// a trunk `through` which they go, the first two keep their place there, square to each other.
+fn upright_planes(elements: &[Element], count: usize, through: Option<DVec3>) -> Vec<Plane> {
     let all = elements
         .iter()
         .fold(Moments::default(), |m, e| m.merged(&e.moments));
@@ -148,13 +139,25 @@ fn upright_planes(elements: &[Element], count: usize) -> Vec<Plane> {
             }
         })
         .collect();
+    if let Some(center) = through {
+        let first = least_horizontal(&all, DVec3::X);
+        planes[0] = Plane {
+            center,
+            normal: first,
+        };
+        planes[1] = Plane {
+            center,
+            normal: DVec3::Y.cross(first),
+        };
+    }
+    let fixed = if through.is_some() { 2 } else { 0 };
     for _ in 0..ROUNDS {
         let mut moments = vec![Moments::default(); count];
         for element in elements {
             let plane = nearest(&planes, element);
             moments[plane] = moments[plane].merged(&element.moments);
         }
-        for (plane, m) in planes.iter_mut().zip(&moments) {
+        for (plane, m) in planes.iter_mut().zip(&moments).skip(fixed) {
             if m.weight > 0.0 {
                 *plane = Plane {
                     center: m.mean,

@@ -44,7 +44,7 @@ const NEAR: Sampling = Sampling {
 };
 
 /// Times that threshold and floor are found in turn.
-const ROUNDS: u32 = 3;
+const ROUNDS: u32 = 4;
 
 /// Highest floor: under the cutoff of 128 with room for rounding in mips.
 const HIGHEST_FLOOR: u8 = 120;
@@ -67,9 +67,13 @@ pub fn match_area(
     }
     // Each number moves the other's area a little; the threshold has the last word, because what
     // is near is seen best.
+    let mut aim = goal.far_area;
     for round in 0..ROUNDS {
         if round > 0 {
-            found.floor = level.floor(foliage, score, found, goal);
+            // The threshold that follows takes some of the far area away again: aim above it.
+            let far = level.far(foliage, score, found, goal);
+            aim *= (goal.far_area / far.max(1e-9)).clamp(0.8, 1.25);
+            found.floor = level.floor(foliage, score, found, goal, aim);
         }
         found.threshold = level.threshold(foliage, score, found, goal);
     }
@@ -145,19 +149,32 @@ impl LevelScene {
         (low + high) / 2.0
     }
 
-    /// The least floor at which the far area is the original's, by bisection.
+    /// The covered area at the far end.
+    fn far(
+        &mut self,
+        foliage: &mut Foliage,
+        score: &[f32],
+        found: Matched,
+        goal: &AreaGoal,
+    ) -> f64 {
+        apply(foliage, score, found);
+        self.area(foliage, &goal.far, Sampling::CLIENT)
+    }
+
+    /// The least floor at which the far area reaches `aim`, by bisection.
     fn floor(
         &mut self,
         foliage: &mut Foliage,
         score: &[f32],
         mut found: Matched,
         goal: &AreaGoal,
+        aim: f64,
     ) -> u8 {
         let (mut low, mut high) = (0u8, HIGHEST_FLOOR);
         while low < high {
             found.floor = low + (high - low) / 2;
             apply(foliage, score, found);
-            if self.area(foliage, &goal.far, Sampling::CLIENT) < goal.far_area {
+            if self.area(foliage, &goal.far, Sampling::CLIENT) < aim {
                 low = found.floor + 1;
             } else {
                 high = found.floor;
