@@ -14,15 +14,18 @@
 pub mod botany;
 pub mod cli;
 pub mod cloud;
+pub mod describe;
 pub mod detail;
 pub mod error;
 pub mod export;
 pub mod knobs;
+pub mod ladder;
 pub mod level;
 pub mod pipeline;
 pub mod recipe;
 pub mod report;
 pub mod scene;
 pub mod space;
+pub mod watch;
 
 pub use error::{Error, Result};

@@ -2,129 +2,306 @@
 
 use std::path::PathBuf;
 
-use crate::botany::{load, recognise};
+use serde_json::Value;
+
+use crate::botany::load::load;
+use crate::botany::model::Model;
+use crate::botany::recognise::recognise;
+use crate::botany::tree::Tree;
+use crate::describe::{Describer, trunk};
 use crate::detail::element::elements;
 use crate::detail::merge::merge;
 use crate::detail::wood::Wood;
 use crate::error::{Error, Result};
-use crate::export::gltf::write_glb;
+use crate::export::combined::{Packed, extras, write_combined};
+use crate::export::gltf::{encode_images, scene_of_model, write_glb};
+use crate::export::manifest::{self, FORMAT, Manifest, Provenance, Range, SUFFIX, VERSION};
 use crate::export::original::Original;
+use crate::export::package::Package;
+use crate::knobs::check;
+pub use crate::ladder::{Limit, Wanted};
+use crate::ladder::{Rung, ranges, rungs};
 use crate::level::{Baker, LevelRequest};
 use crate::recipe::Recipe;
-
-/// How many triangles a level may have.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Limit {
-    /// At most this many.
-    Count(u64),
-    /// At most this share of the original's, 0 to 1.
-    Share(f64),
-}
-
-impl Limit {
-    /// The limit in triangles for an original of `all` triangles.
-    pub fn triangles(self, all: u64) -> u64 {
-        match self {
-            Self::Count(n) => n,
-            Self::Share(s) => (s * all as f64).floor() as u64,
-        }
-    }
-}
+use crate::report::band::{Fault, Trunk, faults};
+use crate::report::schema::Report;
+use crate::report::{Judged, Settings, heights, judge};
+use crate::scene::Scene;
+use crate::space::sha256::sha256;
+use crate::watch::{Watch, begin, step};
 
 /// What to bake.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Request {
     /// The tree.
     pub input: PathBuf,
     /// The package's folder.
     pub output: PathBuf,
-    /// One level for each limit, beside level 0.
-    pub limits: Vec<Limit>,
+    /// Which levels.
+    pub wanted: Wanted,
     /// Knobs.
     pub recipe: Recipe,
+    /// The screen that levels are for.
+    pub scene: Scene,
+    /// Whether to write into a folder that holds other files.
+    pub force: bool,
+    /// Whether to keep levels that left their band.
+    pub accept: bool,
+}
+
+/// What was baked.
+#[derive(Clone, Debug, Default)]
+pub struct Baked {
+    /// Figures of the written files.
+    pub report: Report,
+    /// The package's files, the manifest last.
+    pub files: Vec<String>,
+    /// What was repaired, guessed or, by `accept`, tolerated.
+    pub warnings: Vec<String>,
 }
 
 /// Height of the original's masks in samples.
 const MASK_HEIGHT: f32 = 1024.0;
 
-/// Bakes a tree into a package.
-pub fn bake(request: &Request) -> Result<()> {
-    let model = load::load(&request.input)?;
-    let tree = recognise::recognise(model, &Default::default())?;
-    let elements = elements(&tree);
-    let hierarchy = merge(&elements, request.recipe.locality);
-    let wood = Wood::new(&tree, false);
-    let original = Original::new(&tree.model, request.recipe.training_views, MASK_HEIGHT);
-    std::fs::create_dir_all(&request.output)
-        .map_err(|e| Error::io(&request.output, "create", e))?;
-    let name = tree.model.name.clone();
-    let all = tree.model.triangles.len() as u64;
-    let mut files = Vec::new();
-    for (index, limit) in request.limits.iter().enumerate() {
-        let level = index + 1;
-        let baker = Baker {
-            tree: &tree,
-            elements: &elements,
-            hierarchy: &hierarchy,
-            wood: &wood,
-            original: &original,
-            recipe: &request.recipe,
-        };
-        let made = baker.level(LevelRequest {
-            triangles: limit.triangles(all),
-            height_px: if limit.triangles(all) <= 24 {
-                64.0
-            } else {
-                256.0
-            },
-            end_px: 128.0,
-        });
-        let (scene, matched) = (made.scene, made.matched);
-        let file = request.output.join(format!("{name}_LOD{level}.glb"));
-        let bytes = write_glb(
-            &format!("{name}_LOD{level}"),
-            &scene,
-            &tree.model.frame,
-            serde_json::Value::Null,
-        )?;
-        std::fs::write(&file, bytes).map_err(|e| Error::io(&file, "write", e))?;
-        println!(
-            "level {level}: {} triangles, {matched:?}, atlas {:?}",
-            scene.triangles(),
-            scene.images.first()
-        );
-        files.push(file);
-    }
-    let t = std::time::Instant::now();
-    let levels = files
-        .iter()
-        .map(|f| load::load(f))
-        .collect::<Result<Vec<_>>>()?;
-    let named: Vec<_> = levels.iter().map(|m| (m, m.name.as_str())).collect();
-    let settings = crate::report::Settings {
-        azimuth_offset_deg: 11.0,
-        heights_px: vec![256, 64],
-        ..Default::default()
+/// Azimuth of the first view of the report, degrees: not one of those that levels were fitted to.
+const REPORT_OFFSET_DEG: f32 = 11.0;
+
+/// Bakes a tree into a package: complete, or nothing.
+///
+/// # Errors
+/// See [`Error`]; whatever it is, the output folder is as it was.
+pub fn bake(request: &Request, watch: &dyn Watch) -> Result<Baked> {
+    check(&request.recipe)?;
+    check(&request.scene)?;
+    let package = Package::start(&request.output, request.force)?;
+    begin(watch, "load", 1)?;
+    let provenance = provenance(request)?;
+    let model = load(&request.input)?;
+    let rungs = rungs(
+        &request.wanted,
+        &request.scene,
+        model.triangles.len() as u64,
+    )?;
+    begin(watch, "recognise", 1)?;
+    let tree = recognise(model, &Default::default())?;
+    let ranges = ranges(
+        &rungs,
+        &request.scene,
+        height_m(&tree.model),
+        width_to_height(&tree.model),
+    );
+    let (packed, levels) = levels(request, &tree, &rungs, &ranges, watch)?;
+    begin(watch, "write", packed.len() as u64 + 1)?;
+    let files = write(&package, &tree, &packed, watch)?;
+    let judged = read_back(&package, &packed[1..], &rungs)?;
+    begin(watch, "measure", heights(&judged).len() as u64)?;
+    let report = measure(&tree.model, &files[0], &judged, watch)?;
+    let mut warnings = levels.tree.warnings.clone();
+    warnings.extend(accept(
+        in_band(&tree, &rungs, &judged, &report),
+        request.accept,
+    )?);
+    let manifest = Manifest {
+        provenance,
+        files: files.clone(),
+        ..levels
     };
-    let report = crate::report::evaluate((&tree.model, &name), &named, &settings);
-    for level in &report.levels {
-        for size in &level.sizes {
-            println!(
-                "{:28} {:7} tri @{:3} F1 {:.3} worst {:.3} ({}) E {:.2} P {:.3} R {:.3} area {:.3} [{:.3}]",
-                level.file,
-                level.triangles,
-                size.height_px,
-                size.f1.mean,
-                size.f1.worst,
-                size.f1.worst_view,
-                size.shift_ratio,
-                size.precision.mean,
-                size.recall.mean,
-                size.area_ratio.mean,
-                size.area_ratio.worst
-            );
-        }
+    package.write("report.json", (to_json(&report)? + "\n").as_bytes())?;
+    package.write(&files[files.len() - 1], manifest.to_ron()?.as_bytes())?;
+    package.commit(&files)?;
+    Ok(Baked {
+        report,
+        files,
+        warnings,
+    })
+}
+
+fn provenance(request: &Request) -> Result<Provenance> {
+    let bytes = std::fs::read(&request.input).map_err(|e| Error::io(&request.input, "open", e))?;
+    let name = request.input.file_name().unwrap_or_default();
+    Ok(Provenance {
+        generator: concat!("pleach ", env!("CARGO_PKG_VERSION")).into(),
+        input: name.to_string_lossy().into_owned(),
+        input_bytes: bytes.len() as u64,
+        input_sha256: sha256(&bytes),
+    })
+}
+
+/// Makes all levels, level 0 included, and describes them.
+fn levels(
+    request: &Request,
+    tree: &Tree,
+    rungs: &[Rung],
+    ranges: &[Range],
+    watch: &dyn Watch,
+) -> Result<(Vec<Packed>, Manifest)> {
+    begin(watch, "group", 1)?;
+    let elements = elements(tree);
+    let hierarchy = merge(&elements, request.recipe.locality);
+    let wood = Wood::new(tree, false);
+    begin(watch, "look", 1)?;
+    let original = Original::new(&tree.model, request.recipe.training_views, MASK_HEIGHT);
+    let baker = Baker {
+        tree,
+        elements: &elements,
+        hierarchy: &hierarchy,
+        wood: &wood,
+        original: &original,
+        recipe: &request.recipe,
+    };
+    begin(watch, "describe", 1)?;
+    let describer = Describer::new(tree, &elements, &request.scene);
+    let mut manifest = Manifest {
+        format: FORMAT.into(),
+        version: VERSION,
+        recipe: request.recipe.clone(),
+        scene: request.scene.clone(),
+        tree: describer.original(),
+        subtrees: describer.subtrees(),
+        ..Manifest::default()
+    };
+    let height_m = manifest.tree.height_m;
+    begin(watch, "bake levels", rungs.len() as u64 + 1)?;
+    let name = |level: usize| format!("{}_LOD{level}", tree.model.name);
+    let all = scene_of_model(&tree.model, 0..tree.model.triangles.len() as u32);
+    manifest.levels.push(manifest::Level {
+        file: name(0) + ".glb",
+        triangles: all.triangles(),
+        range: ranges[0],
+        ..manifest::Level::default()
+    });
+    let mut packed = vec![Packed {
+        name: name(0),
+        pngs: encode_images(&all)?,
+        scene: all,
+        extras: extras(0, &ranges[0], 0.0, height_m, &request.scene),
+        range: ranges[0],
+    }];
+    step(watch)?;
+    for (rung, &range) in rungs.iter().zip(&ranges[1..]) {
+        let level = packed.len();
+        let made = baker.level(LevelRequest {
+            triangles: rung.triangles,
+            height_px: rung.height_px as f32,
+            end_px: rung.end_px as f32,
+        });
+        let described = describer.level(level, &(name(level) + ".glb"), &made, range);
+        packed.push(Packed {
+            name: name(level),
+            pngs: encode_images(&made.scene)?,
+            scene: made.scene,
+            extras: extras(level, &range, described.error_m, height_m, &request.scene),
+            range,
+        });
+        manifest.levels.push(described);
+        step(watch)?;
     }
-    eprintln!("evaluate {:.1}s", t.elapsed().as_secs_f64());
-    Ok(())
+    Ok((packed, manifest))
+}
+
+/// Writes every level alone and all in one; returns the names of the package's files.
+fn write(
+    package: &Package,
+    tree: &Tree,
+    packed: &[Packed],
+    watch: &dyn Watch,
+) -> Result<Vec<String>> {
+    let frame = &tree.model.frame;
+    let mut files = Vec::with_capacity(packed.len() + 3);
+    for level in packed {
+        let file = format!("{}.glb", level.name);
+        let extras: Value = level.extras.clone();
+        let bytes = write_glb(&level.name, &level.scene, &level.pngs, frame, extras)?;
+        package.write(&file, &bytes)?;
+        files.push(file);
+        step(watch)?;
+    }
+    let all = format!("{}.glb", tree.model.name);
+    package.write(&all, &write_combined(packed, frame)?)?;
+    files.extend([all, "report.json".into(), tree.model.name.clone() + SUFFIX]);
+    step(watch)?;
+    Ok(files)
+}
+
+/// Loads the levels as an engine would: from their files.
+fn read_back(package: &Package, packed: &[Packed], rungs: &[Rung]) -> Result<Vec<Judged>> {
+    let pixels = |height: f64| (height.round() as u32).max(8);
+    let read = |(level, rung): (&Packed, &Rung)| {
+        let file = format!("{}.glb", level.name);
+        Ok(Judged {
+            model: load(&package.file(&file))?,
+            file,
+            distance_m: level.range.distance_m,
+            heights_px: vec![pixels(rung.height_px), pixels(rung.end_px)],
+        })
+    };
+    packed.iter().zip(rungs).map(read).collect()
+}
+
+fn measure(original: &Model, file: &str, judged: &[Judged], watch: &dyn Watch) -> Result<Report> {
+    let settings = Settings {
+        azimuth_offset_deg: REPORT_OFFSET_DEG,
+        ..Settings::default()
+    };
+    judge((original, file), judged, &settings, || step(watch))
+}
+
+fn in_band(tree: &Tree, rungs: &[Rung], judged: &[Judged], report: &Report) -> Vec<Fault> {
+    let trunk = Trunk::new(&tree.model, &trunk(tree));
+    let mut out = Vec::new();
+    for ((rung, level), row) in rungs.iter().zip(judged).zip(&report.levels) {
+        if row.triangles > rung.triangles {
+            out.push(Fault {
+                what: format!(
+                    "level {} ({}): {} triangles, more than its limit of {}",
+                    row.level, row.file, row.triangles, rung.triangles
+                ),
+                help: "give --triangles a larger number".into(),
+            });
+        }
+        out.extend(faults(&tree.model, level, row, trunk.as_ref()));
+    }
+    out
+}
+
+/// Faults as warnings where they are accepted, else as one error.
+fn accept(faults: Vec<Fault>, accepted: bool) -> Result<Vec<String>> {
+    let lines: Vec<String> = faults.iter().map(|f| f.what.clone()).collect();
+    match faults.first() {
+        Some(first) if !accepted => Err(Error::Refused {
+            what: lines.join("\n  "),
+            help: format!("{}; --accept keeps the levels as they are", first.help),
+        }),
+        _ => Ok(lines),
+    }
+}
+
+/// The report as text.
+///
+/// # Errors
+/// [`Error::Internal`].
+pub fn to_json(report: &Report) -> Result<String> {
+    serde_json::to_string_pretty(report).map_err(|error| Error::Internal {
+        step: "report",
+        what: error.to_string(),
+    })
+}
+
+fn height_m(model: &Model) -> f64 {
+    f64::from(model.height()) * model.frame.radius
+}
+
+/// Wider side of the bounding box over its height.
+fn width_to_height(model: &Model) -> f64 {
+    let (mut low, mut high) = (glam::Vec3::MAX, glam::Vec3::MIN);
+    for p in model
+        .triangles
+        .iter()
+        .flatten()
+        .map(|&i| model.positions[i as usize])
+    {
+        (low, high) = (low.min(p), high.max(p));
+    }
+    let size = (high - low).as_dvec3();
+    size.x.max(size.z) / size.y.max(1e-9)
 }

@@ -1,52 +1,194 @@
 //! `pleach bake`: a tree becomes a package of levels.
 
+use std::io::Write as _;
 use std::path::PathBuf;
+use std::time::Instant;
 
+use super::progress::{Bars, catch_ctrl_c};
 use crate::error::{Error, Result};
-use crate::pipeline::{Limit, Request, bake};
-use crate::recipe::Recipe;
+use crate::knobs::read;
+use crate::pipeline::{Baked, Limit, Request, Wanted, bake, to_json};
+use crate::recipe::{Preset, Recipe};
+use crate::report::schema::{Bake, Level, Report};
+use crate::scene::Scene;
 
 /// Bake levels of detail of a tree.
-#[derive(clap::Args)]
+#[derive(clap::Args, Debug)]
 pub struct Args {
     /// The tree: .glb or .gltf.
     input: PathBuf,
     /// Folder of the package.
-    #[arg(short, long)]
+    #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
     /// One level for each: a count ("5000") or a share of the original ("10%"), wood included.
-    #[arg(long, value_delimiter = ',')]
-    triangles: Vec<String>,
+    #[arg(long, value_delimiter = ',', value_name = "N|%", value_parser = limit)]
+    triangles: Vec<Limit>,
+    /// Number of levels beside the original, at doubling distances; the last is a billboard of the whole tree [default: 4].
+    #[arg(long, conflicts_with = "triangles", value_parser = clap::value_parser!(u8).range(1..=12))]
+    levels: Option<u8>,
+    /// Where the recipe starts from.
+    #[arg(long, value_enum, default_value_t)]
+    preset: Preset,
+    /// Knobs that differ from the preset (RON).
+    #[arg(long, value_name = "FILE.ron")]
+    recipe: Option<PathBuf>,
+    /// Screen, field of view and distances (RON).
+    #[arg(long, value_name = "FILE.ron")]
+    scene: Option<PathBuf>,
+    /// Keep levels that left their band instead of refusing the bake.
+    #[arg(long)]
+    accept: bool,
+    /// Write into a folder that holds other files; they are kept.
+    #[arg(long)]
+    force: bool,
+    /// Threads; 0: one for each core. The package is the same with any number.
+    #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u16).range(0..=1024))]
+    threads: u16,
+    /// No progress, no table.
+    #[arg(long)]
+    quiet: bool,
+    /// Print the report as one JSON object instead of a table.
+    #[arg(long)]
+    json: bool,
 }
 
 /// Runs the command.
 pub fn run(args: Args) -> Result<()> {
-    let limits = args
-        .triangles
-        .iter()
-        .map(|t| limit(t))
-        .collect::<Result<Vec<Limit>>>()?;
-    bake(&Request {
-        input: args.input,
-        output: args.output,
-        limits,
-        recipe: Recipe::default(),
+    let started = Instant::now();
+    let request = request(&args)?;
+    catch_ctrl_c()?;
+    let bars = Bars::new(args.quiet);
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(args.threads.into())
+        .build()
+        .map_err(|e| Error::Internal {
+            step: "start threads",
+            what: e.to_string(),
+        })?;
+    let baked = pool.install(|| bake(&request, &bars))?;
+    bars.finish();
+    let took = Bake {
+        seconds: started.elapsed().as_secs_f64(),
+        peak_bytes: peak_bytes(),
+    };
+    for warning in baked.warnings.iter().filter(|_| !args.quiet) {
+        eprintln!("warning: {warning}");
+    }
+    if args.json {
+        let report = Report {
+            bake: Some(took),
+            ..baked.report
+        };
+        print(&(to_json(&report)? + "\n"))
+    } else if !args.quiet {
+        print(&table(&baked, &took, &request))
+    } else {
+        Ok(())
+    }
+}
+
+fn request(args: &Args) -> Result<Request> {
+    let preset = Recipe::preset(args.preset);
+    Ok(Request {
+        input: args.input.clone(),
+        output: args.output.clone(),
+        wanted: match args.triangles.is_empty() {
+            true => args
+                .levels
+                .map_or_else(Wanted::default, |n| Wanted::Levels(n.into())),
+            false => Wanted::Limits(args.triangles.clone()),
+        },
+        recipe: match &args.recipe {
+            Some(file) => read(file, &preset)?,
+            None => preset,
+        },
+        scene: match &args.scene {
+            Some(file) => read(file, &Scene::default())?,
+            None => Scene::default(),
+        },
+        force: args.force,
+        accept: args.accept,
     })
 }
 
-fn limit(text: &str) -> Result<Limit> {
-    let wrong = || {
-        Error::usage(
-            format!("--triangles: {text:?} is neither a count nor a share"),
-            "write a count such as 5000 or a share such as 10%, separated by commas",
-        )
-    };
+fn limit(text: &str) -> std::result::Result<Limit, String> {
+    let wrong = || "write a count such as 5000 or a share such as 10%".to_string();
     if let Some(share) = text.trim().strip_suffix('%') {
         let share: f64 = share.trim().parse().map_err(|_| wrong())?;
-        if !(share > 0.0 && share <= 100.0) {
-            return Err(wrong());
-        }
-        return Ok(Limit::Share(share / 100.0));
+        return match share > 0.0 && share <= 100.0 {
+            true => Ok(Limit::Share(share / 100.0)),
+            false => Err("a share is more than 0% and at most 100%".into()),
+        };
     }
     text.trim().parse().map(Limit::Count).map_err(|_| wrong())
+}
+
+/// A closed pipe is no fault: the reader has seen enough.
+fn print(text: &str) -> Result<()> {
+    match std::io::stdout().write_all(text.as_bytes()) {
+        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(Error::io(
+            std::path::Path::new("standard output"),
+            "write",
+            e,
+        )),
+        _ => Ok(()),
+    }
+}
+
+/// Peak resident memory, where Linux tells.
+fn peak_bytes() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;
+    let kib: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
+    Some(kib * 1024)
+}
+
+/// One line a level.
+fn table(baked: &Baked, took: &Bake, request: &Request) -> String {
+    let mut out = format!(
+        "{:<28}{:>10}{:>7}{:>9}{:>10}{:>7}{:>8}{:>7}{:>7}{:>7}\n",
+        "level", "triangles", "draws", "tex MB", "from m", "at px", "F1", "worst", "E", "area"
+    );
+    let mib = |bytes: u64| bytes as f64 / 1_048_576.0;
+    if let Some(original) = &baked.report.original {
+        out += &format!(
+            "{:<28}{:>10}{:>7}{:>9.1}{:>10.1}\n",
+            original.file,
+            original.triangles,
+            original.draw_calls,
+            mib(original.texture_bytes),
+            0.0
+        );
+    }
+    for level in &baked.report.levels {
+        out += &line(level);
+    }
+    out += &format!(
+        "\n{} files in {} after {:.1} s",
+        baked.files.len(),
+        request.output.display(),
+        took.seconds
+    );
+    if let Some(peak) = took.peak_bytes {
+        out += &format!(", peak memory {:.0} MB", mib(peak));
+    }
+    out + ".\nE: error over that of the original moved by half a pixel; 1 is as near as that. Area: covered, over the original's.\n"
+}
+
+fn line(level: &Level) -> String {
+    let head = format!(
+        "{:<28}{:>10}{:>7}{:>9.1}{:>10.1}",
+        level.file,
+        level.triangles,
+        level.draw_calls,
+        level.texture_bytes as f64 / 1_048_576.0,
+        level.distance_m
+    );
+    let figures = level.sizes.first().map(|size| {
+        format!(
+            "{:>7}{:>8.3}{:>7.3}{:>7.2}{:>7.3}",
+            size.height_px, size.f1.mean, size.f1.worst, size.shift_ratio, size.area_ratio.mean
+        )
+    });
+    head + &figures.unwrap_or_default() + "\n"
 }

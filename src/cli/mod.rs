@@ -4,6 +4,7 @@ mod bake;
 mod evaluate;
 mod grow;
 mod inspect;
+mod progress;
 
 use std::ffi::OsString;
 use std::process::ExitCode;

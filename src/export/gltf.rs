@@ -6,12 +6,14 @@
 use std::collections::BTreeMap;
 
 use glam::{Vec2, Vec3};
+use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 
 use crate::botany::model::{AlphaMode, Frame, Image, Material, Model, TextureRef, Wrap};
 use crate::detail::wood::WoodMesh;
 use crate::error::{Error, Result};
 use crate::space::glb::GlbBuilder;
+use crate::space::sha256::sha256;
 
 /// A mesh with one material.
 #[derive(Clone, Debug, Default)]
@@ -167,12 +169,23 @@ fn gather(model: &Model, triangles: &[u32]) -> Surface {
     out
 }
 
-/// Writes `scene` as a GLB named `name`; `extras` go on the root node.
-pub fn write_glb(name: &str, scene: &Scene, frame: &Frame, extras: Value) -> Result<Vec<u8>> {
+/// Writes `scene` with its encoded images as a GLB named `name`; `extras` go on the root node.
+pub fn write_glb(
+    name: &str,
+    scene: &Scene,
+    pngs: &[Vec<u8>],
+    frame: &Frame,
+    extras: Value,
+) -> Result<Vec<u8>> {
     let mut file = FileBuilder::default();
-    let mesh = file.mesh(name, scene)?;
+    let mesh = file.mesh(name, scene, pngs)?;
     let node = file.node(name, mesh, frame, extras);
     Ok(file.finish(vec![node]))
+}
+
+/// All images of a scene as PNG, in order.
+pub fn encode_images(scene: &Scene) -> Result<Vec<Vec<u8>>> {
+    scene.images.par_iter().map(encode_png).collect()
 }
 
 /// Collects what goes into one file; several levels may share it.
@@ -185,29 +198,31 @@ pub struct FileBuilder {
     materials: Vec<Value>,
     textures: Vec<Value>,
     images: Vec<Value>,
+    /// SHA-256 of each image.
+    digests: Vec<String>,
     samplers: Vec<Value>,
     unlit: bool,
     used: Vec<&'static str>,
 }
 
 impl FileBuilder {
-    /// Adds all surfaces of a scene as one mesh and returns its index.
-    pub fn mesh(&mut self, name: &str, scene: &Scene) -> Result<usize> {
-        let image_base = self.images.len();
-        for image in &scene.images {
-            let bytes = encode_png(image)?;
-            let view = self.glb.view(&bytes, None);
-            let mut entry = json!({ "bufferView": view, "mimeType": "image/png" });
-            if !image.name.is_empty() {
-                entry["name"] = json!(image.name);
-            }
-            self.images.push(entry);
-        }
-        let material_base = self.materials.len();
-        for material in &scene.materials {
-            let value = self.material(material, image_base);
-            self.materials.push(value);
-        }
+    /// Adds all surfaces of a scene as one mesh and returns its index; `pngs` are its images.
+    /// Images and materials that an earlier mesh has brought are shared.
+    pub fn mesh(&mut self, name: &str, scene: &Scene, pngs: &[Vec<u8>]) -> Result<usize> {
+        let images: Vec<usize> = scene
+            .images
+            .iter()
+            .zip(pngs)
+            .map(|(image, png)| self.image(&image.name, png))
+            .collect();
+        let materials: Vec<usize> = scene
+            .materials
+            .iter()
+            .map(|material| {
+                let value = self.material(material, &images);
+                find_or_push(&mut self.materials, value)
+            })
+            .collect();
         let mut primitives = Vec::new();
         for surface in scene.surfaces.iter().filter(|s| !s.triangles.is_empty()) {
             let uses = uv_sets(&scene.materials[surface.material as usize]);
@@ -235,7 +250,7 @@ impl FileBuilder {
             primitives.push(json!({
                 "attributes": attributes,
                 "indices": indices,
-                "material": material_base + surface.material as usize,
+                "material": materials[surface.material as usize],
             }));
         }
         if primitives.is_empty() {
@@ -247,6 +262,21 @@ impl FileBuilder {
         self.meshes
             .push(json!({ "name": name, "primitives": primitives }));
         Ok(self.meshes.len() - 1)
+    }
+
+    fn image(&mut self, name: &str, png: &[u8]) -> usize {
+        let digest = sha256(png);
+        if let Some(index) = self.digests.iter().position(|d| *d == digest) {
+            return index;
+        }
+        let view = self.glb.view(png, None);
+        let mut entry = json!({ "bufferView": view, "mimeType": "image/png" });
+        if !name.is_empty() {
+            entry["name"] = json!(name);
+        }
+        self.images.push(entry);
+        self.digests.push(digest);
+        self.images.len() - 1
     }
 
     /// Adds a node that places a mesh in the world and returns its index.
@@ -308,7 +338,7 @@ impl FileBuilder {
         self.glb.finish(root)
     }
 
-    fn texture(&mut self, texture: TextureRef, image_base: usize) -> Value {
+    fn texture(&mut self, texture: TextureRef, images: &[usize]) -> Value {
         let wrap = texture.wrap.map(|w| match w {
             Wrap::Repeat => 10497,
             Wrap::Mirror => 33648,
@@ -318,7 +348,7 @@ impl FileBuilder {
         let sampler =
             json!({ "magFilter": mag, "minFilter": 9987, "wrapS": wrap[0], "wrapT": wrap[1] });
         let sampler = find_or_push(&mut self.samplers, sampler);
-        let entry = json!({ "sampler": sampler, "source": image_base + texture.image as usize });
+        let entry = json!({ "sampler": sampler, "source": images[texture.image as usize] });
         let mut info = json!({ "index": find_or_push(&mut self.textures, entry) });
         if texture.uv_set > 0 {
             info["texCoord"] = json!(texture.uv_set);
@@ -326,7 +356,7 @@ impl FileBuilder {
         info
     }
 
-    fn material(&mut self, m: &Material, image_base: usize) -> Value {
+    fn material(&mut self, m: &Material, images: &[usize]) -> Value {
         let mut pbr = json!({});
         if m.base_color_factor != [1.0; 4] {
             pbr["baseColorFactor"] = json!(m.base_color_factor);
@@ -338,10 +368,10 @@ impl FileBuilder {
             pbr["roughnessFactor"] = json!(m.roughness_factor);
         }
         if let Some(t) = m.base_color {
-            pbr["baseColorTexture"] = self.texture(t, image_base);
+            pbr["baseColorTexture"] = self.texture(t, images);
         }
         if let Some(t) = m.metallic_roughness {
-            pbr["metallicRoughnessTexture"] = self.texture(t, image_base);
+            pbr["metallicRoughnessTexture"] = self.texture(t, images);
         }
         let mut out = json!({});
         if !m.name.is_empty() {
@@ -349,21 +379,21 @@ impl FileBuilder {
         }
         out["pbrMetallicRoughness"] = pbr;
         if let Some(t) = m.normal {
-            let mut info = self.texture(t, image_base);
+            let mut info = self.texture(t, images);
             if m.normal_scale != 1.0 {
                 info["scale"] = json!(m.normal_scale);
             }
             out["normalTexture"] = info;
         }
         if let Some(t) = m.occlusion {
-            let mut info = self.texture(t, image_base);
+            let mut info = self.texture(t, images);
             if m.occlusion_strength != 1.0 {
                 info["strength"] = json!(m.occlusion_strength);
             }
             out["occlusionTexture"] = info;
         }
         if let Some(t) = m.emissive {
-            out["emissiveTexture"] = self.texture(t, image_base);
+            out["emissiveTexture"] = self.texture(t, images);
         }
         if m.emissive_factor != [0.0; 3] {
             out["emissiveFactor"] = json!(m.emissive_factor);

@@ -2,6 +2,7 @@
 
 pub mod atlas;
 pub mod chart;
+pub mod combined;
 pub mod edge;
 pub mod foliage;
 pub mod gltf;

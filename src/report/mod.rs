@@ -3,10 +3,12 @@
 //! What is measured is what was written: files are loaded again and drawn over the original's
 //! pictures, supersampled and as an engine draws them.
 
+pub mod band;
 mod contact;
 mod cost;
 mod drawable;
 mod evaluate;
+mod judge;
 mod reference;
 pub mod schema;
 mod silhouette;
@@ -15,5 +17,6 @@ pub use contact::contact_sheet;
 pub use cost::{draw_calls, texture_bytes};
 pub use drawable::Drawable;
 pub use evaluate::{Settings, evaluate};
+pub use judge::{Judged, heights, judge};
 pub use reference::Reference;
 pub use silhouette::{Agreement, agreement};

@@ -15,7 +15,8 @@ pub struct Report {
     /// What the sharing of self-similar sub-trees saves and costs; absent where nothing was baked.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub sharing: Option<Sharing>,
-    /// What the bake itself took; absent where nothing was baked.
+    /// What the bake itself took: in the output of `bake --json` alone. It is absent from
+    /// `report.json`, because a package is the same byte for byte on every run.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub bake: Option<Bake>,
 }
@@ -118,8 +119,8 @@ pub struct Sharing {
 pub struct Bake {
     /// Wall-clock time, seconds.
     pub seconds: f64,
-    /// Peak resident memory, bytes.
-    pub peak_bytes: u64,
+    /// Peak resident memory, bytes; null where the system does not tell.
+    pub peak_bytes: Option<u64>,
 }
 
 impl Figure {

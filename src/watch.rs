@@ -1,0 +1,50 @@
+//! Who watches a bake: told of every step, asked whether to go on.
+
+use crate::error::{Error, Result};
+
+/// Follows a bake. All methods do nothing by default.
+pub trait Watch: Sync {
+    /// A stage of `steps` steps begins; the one before is over.
+    fn stage(&self, name: &str, steps: u64) {
+        let _ = (name, steps);
+    }
+
+    /// A step of the stage is done.
+    fn step(&self) {}
+
+    /// Whether the bake should stop; asked between steps.
+    fn stopped(&self) -> bool {
+        false
+    }
+}
+
+/// Nobody.
+pub struct Unwatched;
+
+impl Watch for Unwatched {}
+
+/// Begins a stage, unless the bake should stop.
+///
+/// # Errors
+/// [`Error::Interrupted`].
+pub fn begin(watch: &dyn Watch, name: &str, steps: u64) -> Result<()> {
+    go_on(watch)?;
+    watch.stage(name, steps);
+    Ok(())
+}
+
+/// Counts a step, unless the bake should stop.
+///
+/// # Errors
+/// [`Error::Interrupted`].
+pub fn step(watch: &dyn Watch) -> Result<()> {
+    watch.step();
+    go_on(watch)
+}
+
+fn go_on(watch: &dyn Watch) -> Result<()> {
+    match watch.stopped() {
+        true => Err(Error::Interrupted),
+        false => Ok(()),
+    }
+}
