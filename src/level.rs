@@ -8,7 +8,7 @@ use crate::cloud::Outline;
 use crate::detail::element::{Element, mean_radius};
 use crate::detail::level::{LevelPlan, Planner};
 use crate::detail::merge::Hierarchy;
-use crate::detail::optimal_cut::Choice;
+use crate::detail::optimal_cut::{Choice, Pruning};
 use crate::detail::reassign::Reassign;
 use crate::detail::whole_tree::whole_tree;
 use crate::detail::wood::{Wood, WoodMesh, WoodOption};
@@ -157,6 +157,20 @@ impl Baker<'_> {
             charts: foliage.charts,
             atlas: foliage.size,
         }
+    }
+
+    /// Fewest triangles whose error is at most `pixels` where the tree is `height_px` high.
+    pub fn triangles_within(&self, pixels: f64, height_px: f64) -> u64 {
+        let area: f64 = self.elements.iter().map(|e| f64::from(e.area)).sum();
+        let length = pixels / height_px * f64::from(self.original.height);
+        let choices = self.choices();
+        let pruning = Pruning {
+            hierarchy: self.hierarchy,
+            card_error: &self.hierarchy.error,
+            card_triangles: if self.recipe.triangular_cards { 1 } else { 2 },
+            choices: &choices,
+        };
+        pruning.cut_within(area * length * length).triangles
     }
 
     fn choices(&self) -> Vec<Vec<Choice>> {

@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use crate::botany::load::load;
 use crate::botany::model::Model;
-use crate::botany::recognise::recognise;
+use crate::botany::recognise::{RecogniseOptions, recognise};
 use crate::botany::tree::Tree;
 use crate::describe::{Describer, trunk};
 use crate::detail::element::elements;
@@ -20,7 +20,7 @@ use crate::export::original::Original;
 use crate::export::package::Package;
 use crate::knobs::check;
 pub use crate::ladder::{Limit, Wanted};
-use crate::ladder::{Rung, ranges, rungs};
+use crate::ladder::{Rung, WHOLE_TREE_TRIANGLES, ranges, rungs};
 use crate::level::{Baker, LevelRequest};
 use crate::recipe::Recipe;
 use crate::report::band::{Fault, Trunk, faults};
@@ -39,6 +39,9 @@ pub struct Request {
     pub output: PathBuf,
     /// Which levels.
     pub wanted: Wanted,
+    /// Levels take no more triangles than this error needs, in pixels where they start. Beside a
+    /// limit of triangles, both hold.
+    pub max_error_px: Option<f64>,
     /// Knobs.
     pub recipe: Recipe,
     /// The screen that levels are for.
@@ -83,7 +86,8 @@ pub fn bake(request: &Request, watch: &dyn Watch) -> Result<Baked> {
         model.triangles.len() as u64,
     )?;
     begin(watch, "recognise", 1)?;
-    let tree = recognise(model, &Default::default())?;
+    let organs = request.recipe.organs.clone();
+    let tree = recognise(model, &RecogniseOptions { organs })?;
     let ranges = ranges(
         &rungs,
         &request.scene,
@@ -180,8 +184,13 @@ fn levels(
     step(watch)?;
     for (rung, &range) in rungs.iter().zip(&ranges[1..]) {
         let level = packed.len();
+        let enough = request.max_error_px.map_or(u64::MAX, |pixels| {
+            baker
+                .triangles_within(pixels, rung.height_px)
+                .max(WHOLE_TREE_TRIANGLES)
+        });
         let made = baker.level(LevelRequest {
-            triangles: rung.triangles,
+            triangles: rung.triangles.min(enough),
             height_px: rung.height_px as f32,
             end_px: rung.end_px as f32,
         });

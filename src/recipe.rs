@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::botany::recognise::OrganRule;
 use crate::knobs::{Knobs, Range};
 
 /// Where a recipe starts from.
@@ -35,6 +36,9 @@ pub struct Recipe {
     pub refine_rounds: u32,
     /// Training views of the fit and of the area match, 4 to 64.
     pub training_views: u32,
+    /// What is wood and what is foliage where shape and material mislead; the first rule that
+    /// matches wins. Default: none.
+    pub organs: Vec<OrganRule>,
     /// Outline of a card: one triangle or a rectangle of two.
     pub triangular_cards: bool,
 }
@@ -109,6 +113,7 @@ impl Recipe {
             samples: 4,
             refine_rounds: 6,
             training_views: 24,
+            organs: Vec::new(),
             triangular_cards: true,
         }
     }

@@ -23,6 +23,9 @@ pub struct Args {
     /// One level for each: a count ("5000") or a share of the original ("10%"), wood included.
     #[arg(long, value_delimiter = ',', value_name = "N|%", value_parser = limit)]
     triangles: Vec<Limit>,
+    /// No more triangles than this error needs: pixels, where the level starts. Beside --triangles, both hold.
+    #[arg(long, value_name = "PX", value_parser = pixels)]
+    max_error: Option<f64>,
     /// Number of levels beside the original, at doubling distances; the last is a billboard of the whole tree [default: 4].
     #[arg(long, conflicts_with = "triangles", value_parser = clap::value_parser!(u8).range(1..=12))]
     levels: Option<u8>,
@@ -98,6 +101,7 @@ fn request(args: &Args) -> Result<Request> {
                 .map_or_else(Wanted::default, |n| Wanted::Levels(n.into())),
             false => Wanted::Limits(args.triangles.clone()),
         },
+        max_error_px: args.max_error,
         recipe: match &args.recipe {
             Some(file) => read(file, &preset)?,
             None => preset,
@@ -109,6 +113,13 @@ fn request(args: &Args) -> Result<Request> {
         force: args.force,
         accept: args.accept,
     })
+}
+
+fn pixels(text: &str) -> std::result::Result<f64, String> {
+    match text.parse() {
+        Ok(pixels) if pixels > 0.0 && pixels <= 1000.0 => Ok(pixels),
+        _ => Err("give a number of pixels from above 0 to 1000".into()),
+    }
 }
 
 fn limit(text: &str) -> std::result::Result<Limit, String> {

@@ -78,6 +78,23 @@ impl Pruning<'_> {
         best
     }
 
+    /// The cut of fewest triangles on the hull whose error is at most `error`; the finest one
+    /// where none is that good.
+    pub fn cut_within(&self, error: f64) -> Cut {
+        let mut best = self.at(0.0);
+        let (mut low, mut high) = (-200.0f64, 60.0f64);
+        for _ in 0..60 {
+            let middle = (low + high) / 2.0;
+            let cut = self.at(middle.exp2());
+            if cut.error <= error {
+                (low, best) = (middle, cut);
+            } else {
+                high = middle;
+            }
+        }
+        best
+    }
+
     /// The cut that minimises `error + multiplier * triangles`.
     pub fn at(&self, multiplier: f64) -> Cut {
         let n = self.hierarchy.elements;
