@@ -174,22 +174,23 @@ impl Baker<'_> {
     }
 
     fn choices(&self) -> Vec<Vec<Choice>> {
-        let choice = |o: &WoodOption| Choice {
+        let choice = |o: &WoodOption, solid: bool| Choice {
             triangles: o.triangles,
-            error: o.error,
+            // A thick branch that is a ribbon or left out vanishes from some views: never chosen.
+            error: if solid && !o.is_round() {
+                f64::INFINITY
+            } else {
+                o.error
+            },
+        };
+        let of_chain = |chain: u32, solid: bool| {
+            let options = &self.wood.tube_options(chain).options;
+            let solid = solid && options.iter().any(WoodOption::is_round);
+            options.iter().map(|o| choice(o, solid)).collect()
         };
         self.elements
             .iter()
-            .map(|e| match e.chain {
-                Some(chain) => self
-                    .wood
-                    .tube_options(chain)
-                    .options
-                    .iter()
-                    .map(choice)
-                    .collect(),
-                None => Vec::new(),
-            })
+            .map(|e| e.chain.map_or(Vec::new(), |chain| of_chain(chain, e.solid)))
             .collect()
     }
 
@@ -204,11 +205,24 @@ impl Baker<'_> {
 
     /// The wood that the plan draws as geometry, its textures no finer than the level needs.
     fn wood(&self, plan: &LevelPlan, height_px: f32) -> Scene {
+        // Chains on cards count as kept whole; what is left out widens its neighbours.
+        let chains = 0..self.tree.skeleton.chains.len() as u32;
+        let mut chosen: Vec<usize> = chains
+            .map(|c| self.wood.tube_options(c).options.len() - 1)
+            .collect();
+        let drawn: Vec<(u32, usize)> = plan
+            .tubes
+            .iter()
+            .filter_map(|&(e, choice)| Some((self.elements[e as usize].chain?, choice as usize)))
+            .collect();
+        for &(chain, choice) in &drawn {
+            chosen[chain as usize] = choice;
+        }
+        let widening = self.wood.widening(&chosen);
         let mut mesh = WoodMesh::default();
-        for &(element, choice) in &plan.tubes {
-            if let Some(chain) = self.elements[element as usize].chain {
-                self.wood.build_tube(chain, choice as usize, 1.0, &mut mesh);
-            }
+        for (chain, choice) in drawn {
+            let scale = widening[chain as usize];
+            self.wood.build_tube(chain, choice, scale, &mut mesh);
         }
         let mut scene = scene_of_wood(&self.tree.model, &mesh);
         let most = (height_px as u32).next_power_of_two().clamp(64, 2048);

@@ -26,6 +26,9 @@ pub struct Element {
     pub moments: Moments,
     /// Area-weighted centre.
     pub center: Vec3,
+    /// Surface that it shows: one side, opaque share only, half the surface for wood; normalised
+    /// units squared, visibility not counted.
+    pub area: f32,
     /// Points whose convex hull holds all that is opaque; empty for wood: its triangles' corners.
     pub outline: Vec<Vec3>,
     /// Wood so thick that it vanishes visibly where a card stands edge-on: never on a card.
@@ -104,9 +107,6 @@ pub fn elements(tree: &Tree) -> Vec<Element> {
                 Some(chain as u32),
                 subtree,
             );
-            // A tube of surface S covers S/4 in the mean over all directions, as a leaf of
-            // one-sided area S/2 does (Cauchy): wood and leaves then weigh alike.
-            wood.scale(0.5);
             wood.scale(visible.weight(wood.center));
             wood.solid = mean_radius(tree, chain as u32) > solid_radius;
             out.push(wood);
@@ -157,7 +157,14 @@ fn element(
             .flat_map(|&t| opacity.outline(model, t))
             .collect(),
     };
+    // A tube of surface S covers S/4 in the mean over all directions, as a leaf of one-sided area
+    // S/2 does (Cauchy): wood and leaves then weigh alike.
+    if chain.is_some() {
+        moments.weight *= 0.5;
+        moments.scatter *= 0.5;
+    }
     Element {
+        area: moments.weight as f32,
         outline,
         solid: false,
         triangles,

@@ -33,6 +33,17 @@ pub struct WoodOption {
     pub shape: Shape,
 }
 
+impl WoodOption {
+    /// Whether it is seen from all around: a tube of three sides or more, or the original.
+    pub fn is_round(&self) -> bool {
+        match self.shape {
+            Shape::Absent => false,
+            Shape::Original => true,
+            Shape::Tube { sides, .. } => sides >= 3,
+        }
+    }
+}
+
 /// What stands for a chain.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Shape {
