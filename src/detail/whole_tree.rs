@@ -20,8 +20,8 @@ use crate::space::eigen::Moments;
 const ROUNDS: u32 = 20;
 /// Share of the cards that lie level.
 const LEVEL_SHARE: f64 = 0.25;
-/// A chain whose mean radius is above this share of the tree's height is thick: a trunk.
-const THICK_SHARE: f32 = 0.01;
+/// A chain whose mean radius is above this share of the thickest one's is a trunk.
+const TRUNK_SHARE: f32 = 0.6;
 
 /// A plane with a fixed kind of normal.
 #[derive(Clone, Copy, Debug)]
@@ -45,7 +45,10 @@ impl Plane {
 pub fn whole_tree(model: &Model, elements: &[Element], radius: &[f32], budget: u64) -> LevelPlan {
     let cards = (budget / 2).clamp(3, 64) as usize;
     let level = ((cards as f64 * LEVEL_SHARE).round() as usize).max(1);
-    let thick = |e: usize| elements[e].chain.is_some() && radius[e] > THICK_SHARE * model.height();
+    let thickest = radius.iter().fold(0.0f32, |m, &r| m.max(r));
+    let thick = |e: usize| {
+        elements[e].chain.is_some() && elements[e].solid && radius[e] >= TRUNK_SHARE * thickest
+    };
     let trunk: Moments = (0..elements.len())
         .filter(|&e| thick(e))
         .fold(Moments::default(), |m, e| m.merged(&elements[e].moments));
