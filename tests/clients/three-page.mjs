@@ -10,10 +10,14 @@ import { boxDown, compare, measure } from './measures.mjs';
 
 const SUPERSAMPLE = 4;
 
-const renderer = new THREE.WebGLRenderer({ antialias: true, alpha: true, preserveDrawingBuffer: true });
-renderer.setPixelRatio(1);
-renderer.setClearColor(0x000000, 0);
-const gl = renderer.getContext();
+function canvas(antialias) {
+  const renderer = new THREE.WebGLRenderer({ antialias, alpha: true });
+  renderer.setPixelRatio(1);
+  renderer.setClearColor(0x000000, 0);
+  return renderer;
+}
+const renderers = { client: canvas(true), reference: canvas(false) };
+const gl = renderers.client.getContext();
 
 /** The file's default scene under a fixed sky and sun, with its bounding box and what it costs. */
 async function load(url) {
@@ -87,7 +91,8 @@ function camera(box, heightPx, { azimuth, elevation }, fov) {
 }
 
 /** One frame, read back from the canvas with its rows from the top down. */
-function frame(scene, eye, pixels) {
+function frame(renderer, scene, eye, pixels) {
+  const gl = renderer.getContext();
   if (pixels > gl.getParameter(gl.MAX_RENDERBUFFER_SIZE)) throw new Error(`${pixels} pixels are too many`);
   renderer.setSize(pixels, pixels, false);
   renderer.render(scene, eye);
@@ -117,18 +122,18 @@ const references = new Map();
  * Draws one file from all views at each height. The first file is the original: it sets the frame and the reference
  * that all are measured against. Returns, for each height and mode, one row of figures a view.
  */
-window.measureFile = async ({ url, label, heights, views, shown, fov }) => {
+window.measureFile = async ({ url, label, modes, heights, views, shown, fov }) => {
   const tree = await load(url);
   if (!original) original = { box: tree.box };
   const results = [];
-  for (const mode of ['client', 'reference']) {
+  for (const mode of modes) {
     if (mode === 'reference') withoutMips(tree.scene);
     for (const height of heights) {
       const factor = mode === 'reference' ? SUPERSAMPLE : 1;
       const pixels = side(original.box, height);
       const rows = views.map((view, index) => {
         const eye = camera(original.box, height, view, fov);
-        const picture = boxDown(frame(tree.scene, eye, pixels * factor), factor);
+        const picture = boxDown(frame(renderers[mode], tree.scene, eye, pixels * factor), factor);
         if (shown.includes(index)) keep(height, `${label}, ${mode}`, picture);
         return { view, measured: measure(picture) };
       });

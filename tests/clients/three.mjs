@@ -2,11 +2,12 @@
 // supersampled original.
 //
 //   node three.mjs ORIGINAL.glb [LEVEL.glb[@HEIGHT[,HEIGHT...]]]... [-o DIR] [--height PX,...] [--views A/E,...]
-//                  [--around N] [--offset DEGREES] [--fov DEGREES] [--targets]
+//                  [--around N] [--offset DEGREES] [--fov DEGREES] [--supersampled] [--targets]
 //
 // HEIGHT is the tree's height in pixels (default 256): a level's own, and half of it, which is twice the distance.
-// Fails if a level is empty from any side, upside down, or of another colour; with --targets also if it misses what the
-// README promises. Prints one JSON object; DIR gets three.json and a sheet of pictures for each height.
+// The original is drawn supersampled too, the levels only with --supersampled. Fails if a level is empty from any side,
+// upside down, or of another colour; with --targets also if it misses what the README promises. Prints one JSON object;
+// with DIR it is written there instead, as three.json, beside a sheet of pictures for each height.
 import { mkdirSync, writeFileSync } from 'node:fs';
 import { basename, join } from 'node:path';
 import { parseArgs } from 'node:util';
@@ -31,6 +32,7 @@ const { values: options, positionals } = parseArgs({
     around: { type: 'string', default: '5' },
     offset: { type: 'string', default: '0' },
     fov: { type: 'string', default: '0' },
+    supersampled: { type: 'boolean', default: false },
     targets: { type: 'boolean', default: false },
   },
 });
@@ -39,6 +41,7 @@ if (positionals.length === 0) {
   process.exit(2);
 }
 
+const supersampled = options.supersampled || options.targets;
 const numbers = (text) => text.split(',').map(Number);
 const files = positionals.map((argument) => {
   const [, file, heights] = argument.match(/^(.*?)(?:@([\d.,]+))?$/);
@@ -53,7 +56,7 @@ const report = await withPage('three.html', files.map((f) => f.file), async (pag
   const about = await page.evaluate('about()');
   const levels = [];
   for (const [index, { file, heights }] of files.entries()) {
-    const job = { url: `/file/${index}`, label: basename(file), heights, views, shown, fov: Number(options.fov) };
+    const job = { url: `/file/${index}`, label: basename(file), modes: index === 0 || supersampled ? ['client', 'reference'] : ['client'], heights, views, shown, fov: Number(options.fov) };
     const measured = await page.evaluate((j) => window.measureFile(j), job);
     levels.push({ file, original: index === 0, ...measured });
   }
