@@ -76,8 +76,7 @@ for (const pair of options.also) {
 const evaluated = JSON.parse(
   execFileSync(
     pleach,
-    ['evaluate', original, ...entries.map((e) => e.file), '-o', join(options.out, 'evaluate'), '--json', '--quiet', '--force',
-      '--height', options.height],
+    ['evaluate', original, ...entries.map((e) => e.file), '-o', join(options.out, 'evaluate'), '--json', '--height', options.height],
     { encoding: 'utf8', maxBuffer: 1 << 28, stdio: ['ignore', 'pipe', 'inherit'] },
   ),
 );
