@@ -1,14 +1,15 @@
 // three.js in headless Chromium draws an original and its levels as a page shows them, and measures them against the
 // supersampled original.
 //
-//   node three.mjs ORIGINAL.glb [LEVEL.glb[@HEIGHT[,HEIGHT...]]]... [-o DIR] [--height PX,...] [--views A/E,...]
-//                  [--around N] [--offset DEGREES] [--fov DEGREES] [--supersampled] [--targets]
+//   node three.mjs ORIGINAL.glb [LEVEL.glb[@HEIGHT[,HEIGHT...]]]... [--package DIR] [-o DIR] [--height PX,...]
+//                  [--views A/E,...] [--around N] [--offset DEGREES] [--fov DEGREES] [--supersampled] [--targets]
 //
-// HEIGHT is the tree's height in pixels (default 256): a level's own, and half of it, which is twice the distance.
+// HEIGHT is the tree's height in pixels (default 256). --package adds all levels of a bake, each where its report.json
+// measured it: at its own height and where the next takes over, half of it, which is twice the distance.
 // The original is drawn supersampled too, the levels only with --supersampled. Fails if a level is empty from any side,
 // upside down, or of another colour; with --targets also if it misses what the README promises. Prints one JSON object;
 // with DIR it is written there instead, as three.json, beside a sheet of pictures for each height.
-import { mkdirSync, writeFileSync } from 'node:fs';
+import { mkdirSync, readFileSync, writeFileSync } from 'node:fs';
 import { basename, join } from 'node:path';
 import { parseArgs } from 'node:util';
 import { withPage } from './browser.mjs';
@@ -27,6 +28,7 @@ const { values: options, positionals } = parseArgs({
   allowPositionals: true,
   options: {
     out: { type: 'string', short: 'o' },
+    package: { type: 'string' },
     height: { type: 'string', default: '256' },
     views: { type: 'string' },
     around: { type: 'string', default: '5' },
@@ -47,8 +49,14 @@ const files = positionals.map((argument) => {
   const [, file, heights] = argument.match(/^(.*?)(?:@([\d.,]+))?$/);
   return { file, heights: numbers(heights ?? options.height) };
 });
-// The original is drawn at every height that a level asks for.
-files[0].heights = [...new Set(files.flatMap((f) => f.heights))].sort((a, b) => b - a);
+if (options.package) {
+  const { levels } = JSON.parse(readFileSync(join(options.package, 'report.json'), 'utf8'));
+  for (const { file, sizes } of levels) {
+    files.push({ file: join(options.package, file), heights: sizes.map((size) => size.height_px) });
+  }
+}
+// The original is drawn at every height that a level asks for, at its own only where there are none.
+files[0].heights = [...new Set((files.length > 1 ? files.slice(1) : files).flatMap((f) => f.heights))].sort((a, b) => b - a);
 const views = options.views ? parseViews(options.views) : defaultViews(Number(options.around), Number(options.offset));
 const shown = [...new Set([0, 0.23, 0.42, 0.66, 0.85, 1].map((t) => Math.round(t * (views.length - 1))))];
 
