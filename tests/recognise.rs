@@ -265,3 +265,76 @@ fn grown_trees_are_recognised() {
     }
     assert!(failed.is_empty(), "below the floor:\n{}", failed.join("\n"));
 }
+
+/// Wood of MTree is one welded skin, and its file says which stem each vertex belongs to.
+#[test]
+fn stems_of_a_welded_skin_are_found() {
+    let folder = std::env::var("PLEACH_TREES")
+        .unwrap_or_else(|_| concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/trees").to_owned());
+    let path = std::path::Path::new(&folder).join("mtree_oak_polyleaf.glb");
+    let Ok(bytes) = std::fs::read(&path) else {
+        println!("skipped: {} is not there", path.display());
+        return;
+    };
+    let model = load_slice(&bytes, &path, &Limits::default()).unwrap();
+    let tree = recognise(model, &RecogniseOptions::default()).unwrap();
+    let (positions, stems, depths) = stem_attributes(&bytes);
+    let key = |p: Vec3| (p * 2e4).round().as_ivec3().to_array();
+    let stem_at: std::collections::HashMap<[i32; 3], (i64, i64)> = (positions.iter())
+        .zip(stems.iter().zip(&depths))
+        .map(|(&p, (&stem, &depth))| (key(normalised(&tree, p)), (stem as i64, depth as i64)))
+        .collect();
+    // Triangles vote for pairs of stem and chain.
+    let mut votes: Vec<(i64, u32, i64)> = Vec::new();
+    for (t, &node) in tree.wood_node.iter().enumerate() {
+        if node != NO_NODE {
+            let chain = tree.skeleton.nodes[node as usize].chain;
+            let corners = tree.model.corners(t as u32);
+            let stems = corners.iter().filter_map(|&p| stem_at.get(&key(p)));
+            votes.extend(stems.map(|&(stem, depth)| (stem, chain, depth)));
+        }
+    }
+    votes.sort_unstable();
+    let (mut all, mut found, mut order) = (0, 0, 0);
+    for stem in votes.chunk_by(|a, b| a.0 == b.0) {
+        let most = stem.chunk_by(|a, b| a.1 == b.1).max_by_key(|r| r.len());
+        let Some(most) = most else { continue };
+        let (_, chain, depth) = most[0];
+        let of_chain = votes.iter().filter(|v| v.1 == chain).count();
+        let alone = most.len() * 10 >= of_chain * 6 && most.len() * 10 >= stem.len() * 6;
+        all += 1;
+        found += usize::from(alone);
+        order += usize::from(alone && tree.skeleton.chains[chain as usize].order as i64 == depth);
+    }
+    println!(
+        "mtree skin: {found} of {all} stems found, {order} with the right order, {} chains",
+        tree.skeleton.chains.len()
+    );
+    assert!(found * 100 >= all * 80, "{found} of {all} stems found");
+}
+
+/// Positions and the attributes `_stem_id` and `_hierarchy_depth` of the file's wood.
+fn stem_attributes(glb: &[u8]) -> (Vec<[f32; 3]>, Vec<f32>, Vec<f32>) {
+    let length = u32::from_le_bytes(glb[12..16].try_into().unwrap()) as usize;
+    let json: serde_json::Value = serde_json::from_slice(&glb[20..20 + length]).unwrap();
+    let binary = &glb[28 + length..];
+    let attributes = &json["meshes"][0]["primitives"][0]["attributes"];
+    let floats = |name: &str, width: usize| -> Vec<f32> {
+        let accessor = &json["accessors"][attributes[name].as_u64().unwrap() as usize];
+        let view = &json["bufferViews"][accessor["bufferView"].as_u64().unwrap() as usize];
+        assert_eq!(accessor["componentType"], 5126);
+        let start =
+            view["byteOffset"].as_u64().unwrap_or(0) + accessor["byteOffset"].as_u64().unwrap_or(0);
+        let count = accessor["count"].as_u64().unwrap() as usize * width;
+        let bytes = &binary[start as usize..start as usize + count * 4];
+        let value = |b: &[u8]| f32::from_le_bytes(b.try_into().unwrap());
+        bytes.chunks_exact(4).map(value).collect()
+    };
+    let flat = floats("POSITION", 3);
+    let positions = flat.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect();
+    (
+        positions,
+        floats("_stem_id", 1),
+        floats("_hierarchy_depth", 1),
+    )
+}

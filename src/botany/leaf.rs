@@ -58,10 +58,10 @@ impl Signature {
         [self.triangles as i64, rough(a), rough(b), rough(d)]
     }
 
-    fn resembles(&self, other: &Self) -> bool {
+    fn resembles(&self, other: &Self, tolerance: f64) -> bool {
         self.triangles == other.triangles
             && (self.invariants.iter().zip(&other.invariants))
-                .all(|(a, b)| (a - b).abs() <= SAME_SHAPE * (a.abs() + b.abs()))
+                .all(|(a, b)| (a - b).abs() <= tolerance * (a.abs() + b.abs()))
     }
 }
 
@@ -174,6 +174,28 @@ fn unite_concentric(pieces: &[Signature]) -> DisjointSets {
     if share >= CROSSED_SHARE { sets } else { apart }
 }
 
+/// The step in which positions were rounded (centimetres of a tree far from the origin,
+/// quantised attributes), normalised units; 0 where none can be made out.
+fn grain(points: &[Vec3]) -> f64 {
+    // Among n free numbers between -1 and 1 the smallest gap is about 2 / n^2.
+    if points.len() < 2000 {
+        return 0.0;
+    }
+    let expected = 2.0 / (points.len() as f64).powi(2);
+    let smallest = (0..3).map(|axis| {
+        let mut values: Vec<f32> = points.iter().map(|p| p[axis]).collect();
+        values.par_sort_unstable_by(f32::total_cmp);
+        let gaps = values.windows(2).map(|w| w[1] - w[0]);
+        gaps.filter(|&g| g > 0.0).fold(f32::MAX, f32::min) as f64
+    });
+    let step = smallest.fold(f64::MAX, f64::min);
+    if step < 1.0 && step > (1000.0 * expected).max(1e-6) {
+        step
+    } else {
+        0.0
+    }
+}
+
 /// Gives every leaf its class. Leaves are compared only with classes in the neighbouring cells
 /// of a hash over the first two invariants.
 fn sort_into_classes(
@@ -182,12 +204,16 @@ fn sort_into_classes(
     leaves: &mut [Leaf],
     signatures: &[Signature],
 ) -> Vec<LeafClass> {
+    let grain = grain(&parts.points);
     let mut classes: Vec<LeafClass> = Vec::new();
     let mut cells: HashMap<u64, Vec<u32>, BuildHasherDefault<Mix>> = HashMap::default();
     for index in 0..leaves.len() {
         let sign = &signatures[index];
         let [x, y] = [sign.invariants[0], sign.invariants[1]].map(|v| v / CELL);
-        let reach = 0.55;
+        let noise = grain / sign.radius.max(1e-30);
+        let tolerance = SAME_SHAPE + 1.5 * noise;
+        // Invariants of a leaf are at most about 2.2, hence the difference that is tolerated.
+        let reach = (4.4 * tolerance / CELL).min(24.0);
         let key = |i: i64, j: i64| {
             (i as u64 & 0xff_ffff) | (j as u64 & 0xff_ffff) << 24 | (sign.triangles as u64) << 48
         };
@@ -202,7 +228,7 @@ fn sort_into_classes(
                     let other = classes[class as usize].prototype as usize;
                     if compared >= MAX_COMPARED
                         || found.is_some_and(|f| class >= f)
-                        || !sign.resembles(&signatures[other])
+                        || !sign.resembles(&signatures[other], tolerance)
                     {
                         continue;
                     }
@@ -212,6 +238,7 @@ fn sort_into_classes(
                         parts,
                         (&leaves[index], sign),
                         (&leaves[other], &signatures[other]),
+                        0.02 + 2.0 * noise,
                     ) {
                         found = Some(class);
                     }
@@ -242,6 +269,7 @@ fn congruent(
     parts: &Parts,
     (a, sign_a): (&Leaf, &Signature),
     (b, sign_b): (&Leaf, &Signature),
+    tolerance: f64,
 ) -> bool {
     let material = |t: u32| model.objects[model.triangle_object[t as usize] as usize].material;
     if material(a.triangles[0]) != material(b.triangles[0]) {
@@ -264,7 +292,11 @@ fn congruent(
             .flat_map(|(i, p)| picked[i + 1..].iter().map(|q| p.distance(*q)))
             .collect()
     };
-    let close = |a: &[f32], b: &[f32]| a.iter().zip(b).all(|(x, y)| (x - y).abs() <= 0.02);
+    let close = |a: &[f32], b: &[f32]| {
+        a.iter()
+            .zip(b)
+            .all(|(x, y)| (x - y).abs() <= tolerance as f32)
+    };
     let (mut da, mut db) = (distances(&pa), distances(&pb));
     let in_order = close(&da, &db);
     if !in_order {

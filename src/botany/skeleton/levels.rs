@@ -15,7 +15,7 @@ use super::{LocalChain, PartSkeleton};
 use crate::botany::part::DisjointSets;
 
 /// A side branch shorter than this many radii of its parent is a bump, not a branch.
-const SHORTEST_IN_RADII: f32 = 1.6;
+const SHORTEST_IN_RADII: f32 = 1.2;
 /// Most bands from base to tip.
 const MAX_BANDS: f32 = 4000.0;
 
@@ -33,41 +33,78 @@ pub fn trace(mesh: &PartMesh) -> PartSkeleton {
     grow_chains(mesh, &bands, pieces, ring_of(mesh, &sources))
 }
 
-/// The points that the distance is counted from: the widest boundary loop, the lowest of those
-/// that are nearly as wide; or the lowest point of a closed skin.
+/// The points that the distance is counted from: the widest ring of the boundary, the lowest of
+/// those that are nearly as wide. Where there is none, the lowest point of a closed skin if it
+/// lies at one of its ends, or else the thicker end.
 fn base(mesh: &PartMesh) -> Vec<u32> {
-    // A strip or a single triangle: its outline is no ring around anything.
-    if let [outline] = mesh.loops.as_slice()
-        && outline.len() == mesh.points.len()
-    {
-        return vec![farthest_from(mesh, farthest_from(mesh, 0))];
+    let rings: Vec<(&Vec<u32>, (Vec3, f32))> = (mesh.loops.iter())
+        .filter(|l| l.len() < mesh.points.len() && is_ring(mesh, l))
+        .map(|l| (l, ring_of(mesh, l)))
+        .collect();
+    let widest = rings.iter().map(|r| r.1.1).fold(0.0, f32::max);
+    let best = (rings.iter())
+        .filter(|r| r.1.1 >= 0.7 * widest)
+        .min_by(|a, b| a.1.0.y.total_cmp(&b.1.0.y));
+    if let Some((ring, _)) = best {
+        return (*ring).clone();
     }
-    let measured: Vec<(Vec3, f32)> = (mesh.loops.iter()).map(|l| ring_of(mesh, l)).collect();
-    let widest = measured.iter().map(|m| m.1).fold(0.0, f32::max);
-    let best = (0..measured.len())
-        .filter(|&i| measured[i].1 >= 0.7 * widest)
-        .min_by(|&a, &b| measured[a].0.y.total_cmp(&measured[b].0.y));
-    match best {
-        Some(i) => mesh.loops[i].clone(),
-        None => {
-            let points = 0..mesh.points.len() as u32;
-            let y = |p: u32| mesh.points[p as usize].y;
-            points
-                .min_by(|&a, &b| y(a).total_cmp(&y(b)))
-                .into_iter()
-                .collect()
+    let one = farthest_from(mesh, 0).0;
+    let (other, length) = farthest_from(mesh, one);
+    let y = |p: u32| mesh.points[p as usize].y;
+    let lowest = (0..mesh.points.len() as u32).min_by(|&a, &b| y(a).total_cmp(&y(b)));
+    match lowest {
+        Some(low) if mesh.loops.is_empty() && farthest_from(mesh, low).1 > 0.6 * length => {
+            vec![low]
         }
+        _ if thickness(mesh, other, length) > thickness(mesh, one, length) => vec![other],
+        _ => vec![one],
     }
 }
 
-/// The point that is farthest from another along the surface.
-fn farthest_from(mesh: &PartMesh, point: u32) -> u32 {
+/// Whether points spread over a plane instead of along a line, as the outline of a torn strip
+/// does: `1 - trace(M^2)` of their normalised covariance is 1/2 on a circle and 0 on a line.
+fn is_ring(mesh: &PartMesh, points: &[u32]) -> bool {
+    let center = ring_of(mesh, points).0.as_dvec3();
+    let mut m = [0.0f64; 6];
+    for &p in points {
+        let d = mesh.points[p as usize].as_dvec3() - center;
+        let products = [
+            d.x * d.x,
+            d.y * d.y,
+            d.z * d.z,
+            d.x * d.y,
+            d.y * d.z,
+            d.z * d.x,
+        ];
+        for (sum, value) in m.iter_mut().zip(products) {
+            *sum += value;
+        }
+    }
+    let trace = m[0] + m[1] + m[2];
+    let [xx, yy, zz, xy, yz, zx] = m.map(|v| v / trace.max(1e-300));
+    1.0 - (xx * xx + yy * yy + zz * zz + 2.0 * (xy * xy + yz * yz + zx * zx)) > 0.15
+}
+
+/// How far the points near one end of a part spread (root mean square).
+fn thickness(mesh: &PartMesh, end: u32, length: f32) -> f64 {
+    let distance = distances(mesh, &[end]);
+    let near: Vec<DVec3> = (mesh.points.iter().zip(&distance))
+        .filter(|(_, d)| **d <= 0.1 * length)
+        .map(|(p, _)| p.as_dvec3())
+        .collect();
+    let center = near.iter().sum::<DVec3>() / near.len().max(1) as f64;
+    let spread: f64 = near.iter().map(|p| p.distance_squared(center)).sum();
+    (spread / near.len().max(1) as f64).sqrt()
+}
+
+/// The point that is farthest from another along the surface, and how far that is.
+fn farthest_from(mesh: &PartMesh, point: u32) -> (u32, f32) {
     let distance = distances(mesh, &[point]);
-    let points = 0..mesh.points.len() as u32;
-    let d = |p: u32| distance[p as usize];
-    points
-        .max_by(|&a, &b| d(a).total_cmp(&d(b)).then(b.cmp(&a)))
-        .unwrap_or(0)
+    let far = (0u32..).zip(&distance);
+    far.fold(
+        (point, 0.0),
+        |best, (p, &d)| if d > best.1 { (p, d) } else { best },
+    )
 }
 
 /// Dijkstra over the edges; points that can't be reached get 0.
@@ -100,7 +137,7 @@ fn distances(mesh: &PartMesh, sources: &[u32]) -> Vec<f32> {
     distance
 }
 
-/// Bands as high as the median edge is long: what the mesh resolves.
+/// Bands somewhat lower than the median edge is long: what the mesh resolves.
 fn band_height(mesh: &PartMesh, farthest: f32) -> f32 {
     let mut lengths: Vec<f32> = (mesh.edges.iter())
         .map(|e| mesh.points[e.ends[0] as usize].distance(mesh.points[e.ends[1] as usize]))
@@ -109,7 +146,7 @@ fn band_height(mesh: &PartMesh, farthest: f32) -> f32 {
     let median = lengths.get(lengths.len() / 2).copied().unwrap_or(farthest);
     // A few giant triangles among tiny ones must not be cut into thousands of bands each.
     let mean = lengths.iter().map(|&l| l as f64).sum::<f64>() / lengths.len().max(1) as f64;
-    (median.max(mean as f32 / 16.0)).clamp(farthest / MAX_BANDS, farthest / 4.0)
+    (0.7 * median.max(mean as f32 / 16.0)).clamp(farthest / MAX_BANDS, farthest / 4.0)
 }
 
 fn ring_of(mesh: &PartMesh, points: &[u32]) -> (Vec3, f32) {
@@ -314,6 +351,8 @@ fn grow_chains(
     upward.sort_by_key(|&p| (pieces[p].band, p));
     let mut children = vec![Vec::new(); pieces.len()];
     for &p in upward.iter().rev() {
+        let own = pieces[p].position.distance(pieces[p].end.0);
+        pieces[p].reach = pieces[p].reach.max(own);
         if let Some(q) = parent[p] {
             let step = pieces[p].position.distance(pieces[q].position);
             pieces[q].reach = pieces[q].reach.max(pieces[p].reach + step);
