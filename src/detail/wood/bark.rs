@@ -158,11 +158,16 @@ fn fit_wrapped(path: &Path, corners: &[[Corner; 3]]) -> Option<(f64, Mapping)> {
     }
     let u_around = sums.around[0] * sums.along[1] >= sums.around[1] * sums.along[0];
     let (around, along) = if u_around { (0, 1) } else { (1, 0) };
-    let turn = nearly_whole(weighted_median(&sums.turns[around])?);
+    let median = weighted_median(&sums.turns[around])?;
+    let turn = nearly_whole(median);
     if turn.abs() < 0.02 {
         return None;
     }
-    let (start, seam) = seam(corners, around, turn)?;
+    let (start, seam, spread) = seam(corners, around, turn);
+    // Twisted or displaced bark still tiles at its scale, if most of its triangles agree on it.
+    if spread > GOOD_FIT && agreement(&sums.turns[around], median) < 0.5 {
+        return None;
+    }
     let rate = sums.along[along] / sums.weight;
     let along = along_the_path(path, corners, along, rate);
     Some((
@@ -222,9 +227,16 @@ fn nearly_whole(turn: f64) -> f64 {
     }
 }
 
-/// The coordinate around at the seam and the angle of the seam; `None` if nothing fits.
-fn seam(corners: &[[Corner; 3]], around: usize, turn: f64) -> Option<(f64, f64)> {
-    let whole = turn == turn.round();
+/// The share of the area whose change once around is within a third of the median's.
+fn agreement(turns: &[(f64, f64)], median: f64) -> f64 {
+    let near = |t: &&(f64, f64)| (t.0 - median).abs() < median.abs() / 3.0;
+    let agreed: f64 = turns.iter().filter(near).map(|t| t.1).sum();
+    agreed / turns.iter().map(|t| t.1).sum::<f64>()
+}
+
+/// The coordinate around at the seam, the angle of the seam, and how far (in turns, one standard
+/// deviation) the corners' coordinates are from it.
+fn seam(corners: &[[Corner; 3]], around: usize, turn: f64) -> (f64, f64, f64) {
     // The coordinate at angle zero, as a phase: whole tiles do not matter.
     let phase = |c: &Corner| (c.uv[around] - turn * c.angle / TAU) * TAU;
     let (mut sin, mut cos, mut count) = (0.0, 0.0, 0.0);
@@ -236,20 +248,17 @@ fn seam(corners: &[[Corner; 3]], around: usize, turn: f64) -> Option<(f64, f64)>
     let concentration = (sin * sin + cos * cos).sqrt() / count;
     // Circular statistics: a spread sigma (radians) leaves a mean vector of exp(-sigma^2 / 2).
     let sigma = (-2.0 * concentration.max(1e-300).ln()).max(0.0).sqrt();
-    if sigma / TAU > GOOD_FIT {
-        // A part of a turn (an atlas strip) is cut somewhere: only whole turns must fit all over.
-        return None;
-    }
     let zero = sin.atan2(cos) / TAU;
-    let start = match whole {
+    let start = match turn == turn.round() {
         true => 0.0,
+        // A part of a turn is a strip of an atlas: it begins where the chain's own does.
         false => corners
             .iter()
             .flatten()
             .map(|c| c.uv[around])
             .fold(f64::INFINITY, f64::min),
     };
-    Some((start, (start - zero) / turn * TAU))
+    (start, (start - zero) / turn * TAU, sigma / TAU)
 }
 
 /// The coordinate along at each point of the path.

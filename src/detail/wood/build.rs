@@ -35,10 +35,84 @@ struct Corners {
 /// How a turn of the golden section spreads the ribbons' faces over all directions.
 const GOLDEN_TURN: f64 = 0.618_033_988_749_894_9;
 
+/// Radii of the carrier by which a foot is moved at most.
+const FARTHEST_FOOT: f64 = 1.5;
+
 impl Wood<'_> {
     /// Appends a chain drawn as one of its options; `radius_scale` thickens it (1: the original's
     /// surface).
     pub fn build_tube(&self, chain: u32, option: usize, radius_scale: f32, out: &mut WoodMesh) {
+        let foot = self.chains[chain as usize]
+            .tube
+            .as_ref()
+            .map(|(path, _)| path.base);
+        self.append(chain, option, radius_scale, foot, out);
+    }
+
+    /// All wood of a level: every chain as chosen (`None`: drawn elsewhere, on a card), what is
+    /// left out made up for in the width of its neighbours, and the loose triangles.
+    pub fn build(&self, chosen: &[Option<usize>], radius_scale: f32) -> WoodMesh {
+        let mut mesh = WoodMesh::default();
+        let widening = self.widening(chosen);
+        for (chain, option) in chosen.iter().enumerate() {
+            let Some(option) = *option else { continue };
+            let scale = radius_scale * widening[chain];
+            let foot = self.foot_on_drawn_carrier(chain, chosen);
+            self.append(chain as u32, option, scale, foot, &mut mesh);
+        }
+        self.build_loose(&mut mesh);
+        mesh
+    }
+
+    /// Where a chain starts so that no gap opens: the simplified carrier runs elsewhere than the
+    /// original did.
+    ///
+    /// A foot moves only where the carrier still passes near it: on far levels carriers run many
+    /// radii off, and twigs that follow them cost more silhouette (F1 .67 to .63 on an oak at 3 %)
+    /// than gaps of a pixel.
+    fn foot_on_drawn_carrier(&self, chain: usize, chosen: &[Option<usize>]) -> Option<DVec3> {
+        let base = self.chains[chain].tube.as_ref()?.0.base;
+        let drawn = self.tree.skeleton.chains[chain].parent.and_then(|carrier| {
+            let options = &self.chains[carrier as usize].curve.options;
+            chosen[carrier as usize].map(|option| &options[option].shape)
+        });
+        let Some(Shape::Tube { rings, .. }) = drawn else {
+            return Some(base);
+        };
+        let on_segment = |pair: &[Ring]| {
+            let along = pair[1].center - pair[0].center;
+            let t = (base - pair[0].center).dot(along) / along.length_squared();
+            let t = if t.is_finite() {
+                t.clamp(0.0, 1.0)
+            } else {
+                0.0
+            };
+            let radius = pair[0].radius + t * (pair[1].radius - pair[0].radius);
+            (pair[0].center + along * t, radius)
+        };
+        let nearest = rings.windows(2).map(on_segment).min_by(|a, b| {
+            let distance = |p: &(DVec3, f64)| p.0.distance_squared(base);
+            distance(a).total_cmp(&distance(b))
+        });
+        match nearest {
+            // Half the radius lies inside whatever the number of sides.
+            Some((axis, radius))
+                if (0.5 * radius..FARTHEST_FOOT * radius).contains(&axis.distance(base)) =>
+            {
+                Some(axis)
+            }
+            _ => Some(base),
+        }
+    }
+
+    fn append(
+        &self,
+        chain: u32,
+        option: usize,
+        scale: f32,
+        foot: Option<DVec3>,
+        out: &mut WoodMesh,
+    ) {
         let wood = &self.chains[chain as usize];
         match (&wood.curve.options[option].shape, &wood.tube) {
             (
@@ -54,27 +128,14 @@ impl Wood<'_> {
                     _ => 0.0,
                 };
                 let zero = bark.seam + roll;
-                let scale = surface_scale(path, rings, *sides, zero) * f64::from(radius_scale);
+                let scale = surface_scale(path, rings, *sides, zero) * f64::from(scale);
                 let mut corners = corners(path, rings, *sides, scale);
-                corners[0].center = path.base;
+                corners[0].center = foot.unwrap_or(path.base);
                 append_tube(wood, rings, &corners, *sides, zero, *two_faces, out);
             }
             (Shape::Absent, _) => {}
-            _ => self.append_original(wood, radius_scale, out),
+            _ => self.append_original(wood, scale, out),
         }
-    }
-
-    /// All wood of a level: every chain as chosen, what is left out made up for in the width of
-    /// its neighbours, and the loose triangles.
-    pub fn build(&self, chosen: &[usize], radius_scale: f32) -> WoodMesh {
-        let mut mesh = WoodMesh::default();
-        let widening = self.widening(chosen);
-        for (chain, &option) in chosen.iter().enumerate() {
-            let scale = radius_scale * widening[chain];
-            self.build_tube(chain as u32, option, scale, &mut mesh);
-        }
-        self.build_loose(&mut mesh);
-        mesh
     }
 
     /// Appends the wood that hangs on no skeleton node, unchanged.

@@ -139,19 +139,21 @@ impl<'a> Wood<'a> {
         chosen
     }
 
-    /// Repairs a choice in which a chain is left out that carries one which is not: the carrier
+    /// Repairs a choice in which a chain is left out that carries one which is drawn: the carrier
     /// gets its cheapest shape. Returns the triangles that this adds.
-    pub fn settle(&self, chosen: &mut [usize]) -> u32 {
+    ///
+    /// `None` stands for a chain that is drawn elsewhere (on a card).
+    pub fn settle(&self, chosen: &mut [Option<usize>]) -> u32 {
         let mut added = 0;
         for chain in (0..self.chains.len()).rev() {
-            if self.is_absent(chain, chosen[chain]) {
+            if chosen[chain].is_none() || self.is_absent(chain, chosen[chain]) {
                 continue;
             }
             // Carriers have smaller indices: one backward pass reaches every root.
             if let Some(carrier) = self.tree.skeleton.chains[chain].parent {
                 let carrier = carrier as usize;
                 if self.is_absent(carrier, chosen[carrier]) {
-                    chosen[carrier] += 1;
+                    chosen[carrier] = Some(1);
                     added += self.chains[carrier].curve.options[1].triangles;
                 }
             }
@@ -160,14 +162,20 @@ impl<'a> Wood<'a> {
     }
 
     /// For each chain the factor of its radius that makes up for the chains that `chosen` leaves
-    /// out; at least 1 for those that are drawn.
-    pub fn widening(&self, chosen: &[usize]) -> Vec<f32> {
+    /// out; `None` stands for a chain that is drawn elsewhere (on a card), which neither gives
+    /// nor takes.
+    pub fn widening(&self, chosen: &[Option<usize>]) -> Vec<f32> {
         let areas: Vec<_> = self.chains.iter().map(|c| c.area).collect();
-        thin::widening(&areas, &self.absences, |c| self.is_absent(c, chosen[c]))
+        let state = |chain: usize| match chosen[chain] {
+            None => thin::State::Elsewhere,
+            Some(_) if self.is_absent(chain, chosen[chain]) => thin::State::Absent,
+            Some(_) => thin::State::Drawn,
+        };
+        thin::widening(&areas, &self.absences, state)
     }
 
-    fn is_absent(&self, chain: usize, option: usize) -> bool {
-        self.chains[chain].curve.options[option].shape == Shape::Absent
+    fn is_absent(&self, chain: usize, option: Option<usize>) -> bool {
+        option.is_some_and(|o| self.chains[chain].curve.options[o].shape == Shape::Absent)
     }
 }
 

@@ -348,10 +348,11 @@ fn what_is_left_out_is_drawn_on_neighbours() {
     let wood = Wood::new(&tree, false);
     let whole: f64 = (0..21).map(|c| wood.area(c)).sum();
     for budget in [2, 8, 20, 60] {
-        let mut chosen = wood.choose(budget);
+        let mut chosen: Vec<_> = wood.choose(budget).into_iter().map(Some).collect();
         wood.settle(&mut chosen);
         let mesh = wood.build(&chosen, 1.0);
-        assert_eq!(mesh.triangles.len() as u64, cost(&wood, &chosen));
+        let options: Vec<_> = chosen.iter().map(|o| o.unwrap_or(0)).collect();
+        assert_eq!(mesh.triangles.len() as u64, cost(&wood, &options));
         // What starts inside the trunk is drawn on top: a little more, never less.
         let ratio = mesh_surface(&mesh) / whole;
         assert!((0.99..1.25).contains(&ratio), "{budget}: {ratio}");
@@ -369,10 +370,32 @@ fn a_branch_never_floats() {
     let twig = [0.2, 0.5, 0.9].map(|x| (Vec3::new(0.3, 0.5 + x, 0.4), 0.02));
     add_tube(&mut tree, &twig, 6, Some((3, 30 + 25)));
     let wood = Wood::new(&tree, true);
-    let mut chosen = vec![0; wood.len()];
-    chosen[21] = 2;
+    let mut chosen = vec![Some(0); wood.len()];
+    chosen[21] = Some(2);
     assert_eq!(wood.tube_options(3).options[0].shape, Shape::Absent);
     let added = wood.settle(&mut chosen);
-    assert!(chosen[3] == 1 && added >= 1);
+    assert!(chosen[3] == Some(1) && added >= 1);
     assert_eq!(wood.settle(&mut chosen), 0, "settling settles");
+}
+
+#[test]
+fn what_a_card_shows_neither_gives_nor_takes_area() {
+    let tree = twiggy();
+    let wood = Wood::new(&tree, true);
+    let absent: Vec<_> = (0..21u32)
+        .filter(|&c| wood.tube_options(c).options[0].shape == Shape::Absent)
+        .collect();
+    assert_eq!(absent.len(), 20, "all but the trunk");
+    // Twig 1 is on a card; all others are left out: the trunk alone takes their area.
+    let mut chosen = vec![Some(0); 21];
+    chosen[1] = None;
+    let trunk = (0..21).find(|c| !absent.contains(c)).expect("one stays") as usize;
+    let widening = wood.widening(&chosen);
+    let given: f64 = (0..21u32)
+        .filter(|&c| c != 1 && c != trunk as u32)
+        .map(|c| wood.area(c))
+        .sum();
+    let expected = 1.0 + given / wood.area(trunk as u32);
+    assert!((f64::from(widening[trunk]) - expected).abs() < 1e-5);
+    assert_eq!(widening[1], 1.0);
 }

@@ -60,26 +60,36 @@ pub(super) fn absences(tree: &Tree, chains: &[ChainWood]) -> Vec<Option<Absence>
     absences
 }
 
+/// What a level does with a chain.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum State {
+    /// It has triangles.
+    Drawn,
+    /// It is left out.
+    Absent,
+    /// Something else shows it.
+    Elsewhere,
+}
+
 /// For each chain the factor of its radius that makes up for the chains that are left out.
 pub(super) fn widening(
     areas: &[f64],
     absences: &[Option<Absence>],
-    is_absent: impl Fn(usize) -> bool,
+    state: impl Fn(usize) -> State,
 ) -> Vec<f32> {
     let mut covered = areas.to_vec();
     for (chain, area) in areas.iter().enumerate() {
-        if !is_absent(chain) {
+        if state(chain) != State::Absent {
             continue;
         }
-        covered[chain] -= area;
-        let mut at = chain;
-        while is_absent(at) {
-            match &absences[at] {
-                Some(absence) => at = absence.host as usize,
-                None => break,
-            }
+        // Hosts never lead back: each was there when its guest left.
+        let mut host = Some(chain);
+        while let Some(at) = host.filter(|&h| state(h) != State::Drawn) {
+            host = absences[at].map(|a| a.host as usize);
         }
-        covered[at] += area;
+        if let Some(host) = host {
+            covered[host] += area;
+        }
     }
     let factor = |(covered, area): (&f64, &f64)| match *area > 0.0 {
         true => (covered / area) as f32,
