@@ -95,13 +95,15 @@ impl Wood<'_> {
             distance(a).total_cmp(&distance(b))
         });
         match nearest {
-            // Half the radius lies inside whatever the number of sides.
-            Some((axis, radius))
-                if (0.5 * radius..FARTHEST_FOOT * radius).contains(&axis.distance(base)) =>
-            {
-                Some(axis)
+            // Half the radius lies inside whatever the number of sides: no deeper than that.
+            Some((axis, radius)) => {
+                let (distance, inside) = (axis.distance(base), 0.5 * radius);
+                match (inside..FARTHEST_FOOT * radius).contains(&distance) {
+                    true => Some(axis.lerp(base, inside / distance)),
+                    false => Some(base),
+                }
             }
-            _ => Some(base),
+            None => Some(base),
         }
     }
 
