@@ -11,7 +11,7 @@ use crate::detail::merge::Hierarchy;
 use crate::detail::optimal_cut::{Choice, Pruning};
 use crate::detail::reassign::Reassign;
 use crate::detail::whole_tree::whole_tree;
-use crate::detail::wood::{Wood, WoodMesh, WoodOption};
+use crate::detail::wood::{Wood, WoodOption};
 use crate::export::chart::Chart;
 use crate::export::foliage::{BakeOptions, Foliage};
 use crate::export::gltf::{Scene, Surface, scene_of_wood};
@@ -205,25 +205,13 @@ impl Baker<'_> {
 
     /// The wood that the plan draws as geometry, its textures no finer than the level needs.
     fn wood(&self, plan: &LevelPlan, height_px: f32) -> Scene {
-        // Chains on cards count as kept whole; what is left out widens its neighbours.
-        let chains = 0..self.tree.skeleton.chains.len() as u32;
-        let mut chosen: Vec<usize> = chains
-            .map(|c| self.wood.tube_options(c).options.len() - 1)
-            .collect();
-        let drawn: Vec<(u32, usize)> = plan
-            .tubes
-            .iter()
-            .filter_map(|&(e, choice)| Some((self.elements[e as usize].chain?, choice as usize)))
-            .collect();
-        for &(chain, choice) in &drawn {
-            chosen[chain as usize] = choice;
+        let mut chosen = vec![None; self.wood.len()];
+        for &(element, choice) in &plan.tubes {
+            if let Some(chain) = self.elements[element as usize].chain {
+                chosen[chain as usize] = Some(choice as usize);
+            }
         }
-        let widening = self.wood.widening(&chosen);
-        let mut mesh = WoodMesh::default();
-        for (chain, choice) in drawn {
-            let scale = widening[chain as usize];
-            self.wood.build_tube(chain, choice, scale, &mut mesh);
-        }
+        let mesh = self.wood.build(&chosen, 1.0);
         let mut scene = scene_of_wood(&self.tree.model, &mesh);
         let most = (height_px as u32).next_power_of_two().clamp(64, 2048);
         for image in &mut scene.images {

@@ -142,7 +142,7 @@ fn levels(
     begin(watch, "group", 1)?;
     let elements = elements(tree);
     let hierarchy = merge(&elements, request.recipe.locality);
-    let wood = Wood::new(tree, false);
+    let wood = Wood::new(tree, true);
     begin(watch, "look", 1)?;
     let original = Original::new(&tree.model, request.recipe.training_views, MASK_HEIGHT);
     let baker = Baker {

@@ -97,6 +97,8 @@ pub fn scene_of_wood(model: &Model, mesh: &WoodMesh) -> Scene {
     let mut images: BTreeMap<u32, u32> = BTreeMap::new();
     for (material, triangles) in by_material {
         let mut copy = model.materials[material as usize].clone();
+        // Thin twigs are ribbons of one sheet.
+        copy.double_sided = true;
         for texture in textures_of(&mut copy).into_iter().flatten() {
             let next = images.len() as u32;
             texture.image = *images.entry(texture.image).or_insert(next);
