@@ -10,8 +10,8 @@ pub const WHOLE_TREE_TRIANGLES: u64 = 24;
 /// Levels where nothing else is asked for.
 pub const DEFAULT_LEVELS: usize = 4;
 
-/// The least that a level can be drawn with.
-const LEAST_TRIANGLES: u64 = 2;
+/// The least that a level can be drawn with: three cards of two triangles.
+const LEAST_TRIANGLES: u64 = 6;
 
 /// How many triangles a level may have.
 #[derive(Clone, Copy, Debug, PartialEq)]

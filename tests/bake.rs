@@ -88,6 +88,8 @@ impl Place {
     fn new() -> Self {
         let home = tempfile::tempdir().unwrap();
         small_tree(&home.path().join("tree.glb"), 300);
+        // Small on the screen, so that measuring is quick.
+        std::fs::write(home.path().join("small.ron"), "(first_height_px: 64)").unwrap();
         Self { home }
     }
 
@@ -104,6 +106,10 @@ impl Place {
             output.to_str().unwrap(),
         ];
         all.extend(["--preset", "draft", "--accept"]);
+        let scene = self.path("small.ron");
+        if !more.contains(&"--scene") {
+            all.extend(["--scene", scene.to_str().unwrap()]);
+        }
         all.extend(more);
         pleach(&all)
     }
@@ -263,7 +269,7 @@ fn foreign_folders_are_left_alone_and_own_packages_replaced() {
         "tree_LOD1.glb",
     ];
     assert_eq!(names(&place.path("out")), left);
-    assert_eq!(names(place.home.path()), ["out", "tree.glb"]);
+    assert_eq!(names(place.home.path()), ["out", "small.ron", "tree.glb"]);
 }
 
 #[test]
@@ -382,7 +388,7 @@ fn ctrl_c_leaves_what_was_there() {
         .spawn()
         .unwrap();
     // The folder beside the output shows that the bake has begun.
-    let begun = || names(place.home.path()).len() > 1;
+    let begun = || names(place.home.path()).len() > 2;
     for _ in 0..2000 {
         if begun() {
             break;
@@ -398,5 +404,5 @@ fn ctrl_c_leaves_what_was_there() {
             .success()
     );
     assert_eq!(child.wait().unwrap().code(), Some(130));
-    assert_eq!(names(place.home.path()), ["tree.glb"]);
+    assert_eq!(names(place.home.path()), ["small.ron", "tree.glb"]);
 }

@@ -116,7 +116,8 @@ impl Package {
         if !self.output.exists() {
             return std::fs::rename(&self.draft, &self.output);
         }
-        let old = self.draft.with_extension("old");
+        let mut old = self.draft.clone().into_os_string();
+        old.push("-old");
         std::fs::rename(&self.output, &old)?;
         if let Err(error) = std::fs::rename(&self.draft, &self.output) {
             std::fs::rename(&old, &self.output)?;
