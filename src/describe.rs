@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use crate::botany::model::Frame;
 use crate::botany::tree::{NO_NODE, Organ, Tree};
-use crate::cloud::coverage::{coverage, pixel_size};
+use crate::cloud::coverage::{coverage, epsilon};
 use crate::cloud::foliage::{Face, Foliage};
 use crate::cloud::occlusion::Occlusion;
 use crate::detail::element::Element;
@@ -13,6 +13,9 @@ use crate::export::foliage::CardGroup;
 use crate::export::manifest::{Card, Level, Original, Range, Subtree};
 use crate::level;
 use crate::scene::Scene;
+
+/// `epsilon` of a card's coverage, in pixels at the distance where its level starts.
+const TOLERANCE_PX: f64 = 4.0;
 
 /// A tree, and what describing many cards of it needs.
 pub struct Describer<'a> {
@@ -113,7 +116,8 @@ impl<'a> Describer<'a> {
             connector: Vec3::ZERO,
         };
         let fov = self.scene.fov_deg.to_radians();
-        let epsilon = pixel_size(range.distance_m, fov, self.scene.screen_height_px) / frame.radius;
+        let lines = self.scene.screen_height_px;
+        let epsilon = epsilon(range.distance_m, fov, lines, TOLERANCE_PX) / frame.radius;
         let shown = coverage(&foliage, std::slice::from_ref(&group.card), epsilon);
         let weight: f64 = members
             .iter()

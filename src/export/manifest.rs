@@ -131,7 +131,8 @@ pub struct Card {
     pub error_m: f64,
     /// `A`: surface area of the foliage that it shows, one side, square metres.
     pub area_m2: f64,
-    /// `C`: foliage within a pixel of the card, minus what is farther off; square metres.
+    /// `C`: foliage within four pixels of the card (at the distance where the level starts), minus
+    /// what is farther off; square metres.
     pub coverage_m2: f64,
     /// `sigma`: how visible the place is from anywhere, 1 free, 0 hidden by leaves.
     pub sigma: f64,
