@@ -4,7 +4,9 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use crate::botany::grow::{Foliage, MAX_LEAVES, Nodes, Options, Species, TrueSkeleton, Wood, grow};
+use crate::botany::grow::{
+    Foliage, Grown, MAX_LEAVES, Nodes, Options, Species, TrueSkeleton, Wood, grow,
+};
 use crate::{Error, Result};
 
 /// Grows a sample tree and writes its true skeleton beside it.
@@ -31,6 +33,12 @@ pub struct GrowArgs {
     /// How geometry is spread over nodes.
     #[arg(long, value_enum, default_value_t)]
     nodes: Nodes,
+    /// Print one JSON object on standard output.
+    #[arg(long)]
+    json: bool,
+    /// Print nothing.
+    #[arg(short, long, conflicts_with = "json")]
+    quiet: bool,
 }
 
 /// Runs the command.
@@ -50,18 +58,36 @@ pub fn run(args: &GrowArgs) -> Result<()> {
     write_whole(&args.output, &grown.glb)?;
     let truth = TrueSkeleton::path_beside(&args.output);
     write_whole(&truth, grown.skeleton.to_ron().as_bytes())?;
-    println!(
-        "{}: {} branches, {} leaves, {} triangles ({} wood, {} foliage), {:.1} MB; skeleton in {}",
-        args.output.display(),
-        grown.skeleton.chains.len(),
-        grown.skeleton.leaves.len(),
-        grown.triangles[0] + grown.triangles[1],
-        grown.triangles[0],
-        grown.triangles[1],
-        grown.glb.len() as f64 / 1e6,
-        truth.display(),
-    );
+    if args.json {
+        println!("{}", summary(&grown, args, &truth));
+    } else if !args.quiet {
+        println!(
+            "{}: {} branches, {} leaves, {} triangles ({} wood, {} foliage), {:.1} MB; skeleton in {}",
+            args.output.display(),
+            grown.skeleton.chains.len(),
+            grown.skeleton.leaves.len(),
+            grown.triangles[0] + grown.triangles[1],
+            grown.triangles[0],
+            grown.triangles[1],
+            grown.glb.len() as f64 / 1e6,
+            truth.display(),
+        );
+    }
     Ok(())
+}
+
+/// What was grown, for programs.
+fn summary(grown: &Grown, args: &GrowArgs, truth: &Path) -> serde_json::Value {
+    serde_json::json!({
+        "file": args.output.display().to_string(),
+        "skeleton_file": truth.display().to_string(),
+        "branches": grown.skeleton.chains.len(),
+        "leaves": grown.skeleton.leaves.len(),
+        "wood_triangles": grown.triangles[0],
+        "foliage_triangles": grown.triangles[1],
+        "file_bytes": grown.glb.len(),
+        "seed": args.seed,
+    })
 }
 
 /// A species by its name, or from its file.
@@ -84,6 +110,9 @@ fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
     let mut part = path.as_os_str().to_owned();
     part.push(".part");
     let part = PathBuf::from(part);
-    std::fs::write(&part, bytes).map_err(|e| Error::io(&part, "write", e))?;
-    std::fs::rename(&part, path).map_err(|e| Error::io(path, "write", e))
+    let done = std::fs::write(&part, bytes).and_then(|()| std::fs::rename(&part, path));
+    done.map_err(|e| {
+        let _ = std::fs::remove_file(&part);
+        Error::io(path, "write", e)
+    })
 }

@@ -33,15 +33,19 @@ impl Parts {
     /// Adds a mesh with one primitive.
     fn mesh(&mut self, name: &str, mesh: &Mesh, material: usize) -> usize {
         let glb = &mut self.glb;
-        self.meshes.push(json!({ "name": name, "primitives": [{
-            "attributes": {
-                "POSITION": glb.positions(&mesh.positions),
-                "NORMAL": glb.vec3(&mesh.normals),
-                "TEXCOORD_0": glb.vec2(&mesh.uvs),
-            },
-            "indices": glb.indices(&mesh.triangles, mesh.positions.len()),
-            "material": material,
-        }]}));
+        let mut attributes = json!({
+            "POSITION": glb.positions(&mesh.positions),
+            "NORMAL": glb.vec3(&mesh.normals),
+            "TEXCOORD_0": glb.vec2(&mesh.uvs),
+        });
+        // Bark has a normal map.
+        if material == BARK {
+            attributes["TANGENT"] = json!(glb.vec4(&mesh.tangents()));
+        }
+        let indices = glb.indices(&mesh.triangles, mesh.positions.len());
+        self.meshes.push(json!({ "name": name, "primitives": [
+            { "attributes": attributes, "indices": indices, "material": material },
+        ]}));
         self.meshes.len() - 1
     }
 
@@ -183,6 +187,16 @@ fn document(
         }
         materials.push(leaf);
     }
+    // REPEAT for bark, CLAMP_TO_EDGE for leaves.
+    let wraps: &[u32] = if list.len() > 2 {
+        &[10497, 33071]
+    } else {
+        &[10497]
+    };
+    let samplers: Vec<Value> = wraps
+        .iter()
+        .map(|w| json!({ "magFilter": 9729, "minFilter": 9987, "wrapS": w, "wrapT": w }))
+        .collect();
     let roots: Vec<usize> = (0..parts.nodes.len()).collect();
     Ok(json!({
         "asset": { "version": "2.0", "generator": concat!("pleach grow ", env!("CARGO_PKG_VERSION")) },
@@ -193,9 +207,6 @@ fn document(
         "materials": materials,
         "textures": textures,
         "images": list,
-        "samplers": [
-            { "magFilter": 9729, "minFilter": 9987, "wrapS": 10497, "wrapT": 10497 },
-            { "magFilter": 9729, "minFilter": 9987, "wrapS": 33071, "wrapT": 33071 },
-        ],
+        "samplers": samplers,
     }))
 }

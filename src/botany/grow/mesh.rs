@@ -49,6 +49,32 @@ impl Mesh {
         soup
     }
 
+    /// Tangents along +u (with the sign of the bitangent), as a normal map needs them: the mean of
+    /// the triangles around a vertex (Lengyel, "Computing tangent space basis vectors", 2001).
+    pub fn tangents(&self) -> Vec<[f32; 4]> {
+        let mut sums = vec![Vec3::ZERO; self.positions.len()];
+        for triangle in &self.triangles {
+            let [a, b, c] = triangle.map(|i| self.positions[i as usize]);
+            let [p, q, r] = triangle.map(|i| self.uvs[i as usize]);
+            let (q, r) = (q - p, r - p);
+            // Up to a positive factor, which is all that a direction needs.
+            let along = ((b - a) * r.y - (c - a) * q.y) * q.perp_dot(r).signum();
+            let along = along.normalize_or_zero();
+            for &i in triangle {
+                sums[i as usize] += along;
+            }
+        }
+        sums.iter()
+            .zip(&self.normals)
+            .map(|(&sum, &n)| {
+                let fallback = n.any_orthonormal_vector();
+                let t = (sum - n * n.dot(sum)).normalize_or(fallback);
+                // No bark is mirrored: cross(normal, tangent) points up the image.
+                [t.x, t.y, t.z, 1.0]
+            })
+            .collect()
+    }
+
     /// The mesh moved by `-origin`.
     pub fn relative_to(mut self, origin: Vec3) -> Mesh {
         for p in &mut self.positions {

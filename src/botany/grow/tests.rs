@@ -198,6 +198,27 @@ fn a_tube_is_one_piece_and_soup_shares_nothing() {
 }
 
 #[test]
+fn tangents_run_around_the_stem_and_bitangents_up() {
+    for species in species() {
+        for stem in stems(&species).iter().step_by(29) {
+            let tube = tube::tube(&species, stem);
+            for &t in &tube.triangles[..2 * species.levels[stem.level].sides as usize] {
+                let [a, b, c] = t.map(|i| i as usize);
+                let n = tube.normals[a];
+                let t = Vec3::from_slice(&tube.tangents()[a][..3]);
+                assert!(n.dot(t).abs() < 1e-4 && (t.length() - 1.0).abs() < 1e-4);
+                // The bitangent looks to where v falls: rows of an image go down.
+                for corner in [b, c] {
+                    let rise = tube.uvs[a].y - tube.uvs[corner].y;
+                    let up = n.cross(t).dot(tube.positions[corner] - tube.positions[a]);
+                    assert!(rise.abs() < 1e-3 || rise * up > 0.0, "{}", species.name);
+                }
+            }
+        }
+    }
+}
+
+#[test]
 fn a_skin_is_one_closed_piece_open_at_the_ground_alone() {
     for species in species() {
         let stems = stems(&species);
