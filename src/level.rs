@@ -132,12 +132,14 @@ impl Baker<'_> {
             },
         );
         let views = self.original.directions.iter().step_by(3);
-        let near: Vec<_> = views.clone().map(|d| camera(d, pixels)).collect();
+        // Supersampled area hardly depends on the size: the near end is judged no larger than this.
+        let near_pixels = pixels.min(256.0 / self.original.height);
+        let near: Vec<_> = views.clone().map(|d| camera(d, near_pixels)).collect();
         let far: Vec<_> = views.map(|d| camera(d, pixels / 2.0)).collect();
         let area: f64 = self.original.areas().iter().step_by(3).sum();
         let goal = AreaGoal {
             near,
-            near_area: area * f64::from(pixels * pixels),
+            near_area: area * f64::from(near_pixels * near_pixels),
             far,
             far_area: area * f64::from(pixels * pixels) / 4.0,
         };

@@ -9,6 +9,7 @@ use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 
+use super::tangent::tangents;
 use crate::botany::model::{AlphaMode, Frame, Image, Material, Model, TextureRef, Wrap};
 use crate::detail::wood::WoodMesh;
 use crate::error::{Error, Result};
@@ -234,8 +235,10 @@ impl FileBuilder {
                 json!(self.glb.positions(&surface.positions)),
             );
             attributes.insert("NORMAL".into(), json!(self.glb.vec3(&surface.normals)));
-            if !surface.tangents.is_empty() {
-                attributes.insert("TANGENT".into(), json!(self.glb.vec4(&surface.tangents)));
+            if let Some(tangents) =
+                tangents_of(surface, &scene.materials[surface.material as usize])
+            {
+                attributes.insert("TANGENT".into(), json!(self.glb.vec4(&tangents)));
             }
             if uses[0] || uses[1] {
                 attributes.insert("TEXCOORD_0".into(), json!(self.glb.vec2(&surface.uvs[0])));
@@ -419,6 +422,24 @@ impl FileBuilder {
         }
         out
     }
+}
+
+/// The surface's tangents; made where a normal map needs them and the source has none, because
+/// engines would each make their own.
+fn tangents_of(surface: &Surface, material: &Material) -> Option<Vec<[f32; 4]>> {
+    if !surface.tangents.is_empty() {
+        return Some(surface.tangents.clone());
+    }
+    let uvs = &surface.uvs[usize::from(material.normal?.uv_set)];
+    let complete = uvs.len() == surface.positions.len();
+    complete.then(|| {
+        tangents(
+            &surface.positions,
+            &surface.normals,
+            uvs,
+            &surface.triangles,
+        )
+    })
 }
 
 fn uv_sets(m: &Material) -> [bool; 2] {

@@ -13,3 +13,4 @@ pub mod original;
 pub mod package;
 pub mod project;
 pub mod refine;
+pub mod tangent;
