@@ -348,13 +348,13 @@ fn a_place_that_cannot_be_written_is_said_before_the_work() {
 fn an_error_that_may_be_larger_needs_fewer_triangles() {
     let place = Place::new();
     let triangles = |output: &str, pixels: &str| {
-        let more = ["--levels", "2", "--max-error", pixels];
+        let more = ["--triangles", "50%", "--max-error", pixels];
         assert_eq!(place.code(output, &more), 0);
         let text = std::fs::read_to_string(place.path(output).join("report.json")).unwrap();
         serde_json::from_str::<Report>(&text).unwrap().levels[0].triangles
     };
-    let (near, far) = (triangles("a", "0.5"), triangles("b", "20"));
-    assert!(far < near, "{far} for 20 pixels, {near} for half a pixel");
+    let (near, far) = (triangles("a", "0.02"), triangles("b", "20"));
+    assert!(far < near, "{far} for 20 pixels, {near} for a fiftieth");
 }
 
 #[test]
