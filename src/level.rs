@@ -67,6 +67,12 @@ pub struct Level {
 /// Levels of at most so many triangles are whole-tree billboards.
 const WHOLE_TREE_TRIANGLES: u64 = 24;
 
+/// Times that the wood's radius is tried.
+const WOOD_TRIES: u32 = 4;
+
+/// Excess of the covered area that is left alone.
+const WOOD_TOLERANCE: f64 = 0.005;
+
 impl Baker<'_> {
     /// Makes one level.
     pub fn level(&self, request: LevelRequest) -> Level {
@@ -103,7 +109,6 @@ impl Baker<'_> {
                 request.triangles,
             )
         });
-        let mut scene = self.wood(&plan, height_px);
         // Levels are looked at from nearer than they are made for: never fewer texels than this.
         let texels_px = if whole {
             height_px.max(128.0)
@@ -111,24 +116,13 @@ impl Baker<'_> {
             height_px.max(256.0)
         };
         let pixels = texels_px / self.original.height;
-        let mut foliage = Foliage::bake(
+        let projected = Foliage::bake(
             &self.tree.model,
             &plan.cards,
             BakeOptions {
                 density: pixels * self.recipe.texel_density,
                 pad: self.recipe.gutter_texels,
                 samples: self.recipe.samples,
-            },
-        );
-        let targets = self
-            .original
-            .targets(2, Some(&wood_scene(&merge_wood(&scene))));
-        let score = refine(
-            &foliage,
-            &targets,
-            Refine {
-                rounds: self.recipe.refine_rounds,
-                weight: 1.0,
             },
         );
         let views = self.original.directions.iter().step_by(3);
@@ -143,7 +137,32 @@ impl Baker<'_> {
             far,
             far_area: area * f64::from(pixels * pixels) / 4.0,
         };
-        let matched = match_area(&mut foliage, &score, &scene.surfaces, &goal);
+        // Where the wood alone covers more than the original, no alpha can make up for it (bare
+        // trees): then the tubes become thinner, and the cards are fitted again.
+        let mut radius_scale = 1.0f32;
+        let mut tries = 0;
+        let (mut scene, mut foliage, matched) = loop {
+            let scene = self.wood(&plan, height_px, radius_scale);
+            let mut foliage = projected.clone();
+            let targets = self
+                .original
+                .targets(2, Some(&wood_scene(&merge_wood(&scene))));
+            let score = refine(
+                &foliage,
+                &targets,
+                Refine {
+                    rounds: self.recipe.refine_rounds,
+                    weight: 1.0,
+                },
+            );
+            let matched = match_area(&mut foliage, &score, &scene.surfaces, &goal);
+            tries += 1;
+            let over = matched.near_ratio;
+            if tries == WOOD_TRIES || plan.tubes.is_empty() || over <= 1.0 + WOOD_TOLERANCE {
+                break (scene, foliage, matched);
+            }
+            radius_scale /= over.min(1.25) as f32;
+        };
         foliage.bleed();
         let mut surface = foliage.surface();
         surface.material = scene.materials.len() as u32;
@@ -206,14 +225,14 @@ impl Baker<'_> {
     }
 
     /// The wood that the plan draws as geometry, its textures no finer than the level needs.
-    fn wood(&self, plan: &LevelPlan, height_px: f32) -> Scene {
+    fn wood(&self, plan: &LevelPlan, height_px: f32, radius_scale: f32) -> Scene {
         let mut chosen = vec![None; self.wood.len()];
         for &(element, choice) in &plan.tubes {
             if let Some(chain) = self.elements[element as usize].chain {
                 chosen[chain as usize] = Some(choice as usize);
             }
         }
-        let mesh = self.wood.build(&chosen, 1.0);
+        let mesh = self.wood.build(&chosen, radius_scale);
         let mut scene = scene_of_wood(&self.tree.model, &mesh);
         let most = (height_px as u32).next_power_of_two().clamp(64, 2048);
         for image in &mut scene.images {

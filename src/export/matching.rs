@@ -191,6 +191,11 @@ impl LevelScene {
             double_sided: true,
             ..Material::default()
         };
+        // As it is written: thin twigs are ribbons of one sheet that both sides show.
+        let bark = Material {
+            double_sided: true,
+            ..Material::default()
+        };
         let scene = Scene {
             geometry: Geometry {
                 positions: &self.surface.positions,
@@ -200,7 +205,7 @@ impl LevelScene {
                 triangles: &self.surface.triangles,
                 triangle_material: &self.materials,
             },
-            materials: &[cards, Material::default()],
+            materials: &[cards, bark],
             textures: &self.textures,
         };
         let areas: Vec<f64> = cameras
