@@ -2,7 +2,6 @@
 
 use glam::Vec2;
 
-use crate::botany::model::Material;
 use crate::botany::tree::Tree;
 use crate::cloud::Outline;
 use crate::detail::element::{Element, mean_radius};
@@ -14,11 +13,11 @@ use crate::detail::whole_tree::whole_tree;
 use crate::detail::wood::{Wood, WoodOption};
 use crate::export::chart::Chart;
 use crate::export::foliage::{BakeOptions, Foliage};
-use crate::export::gltf::{Scene, Surface, scene_of_wood};
 use crate::export::matching::{AreaGoal, Matched, match_area};
 use crate::export::mip::shrink;
 use crate::export::original::{Original, camera};
 use crate::export::refine::{Refine, refine};
+use crate::export::surface::{Scene, Surface, scene_of_wood};
 use crate::recipe::Recipe;
 use crate::space::raster;
 
@@ -235,8 +234,9 @@ impl Baker<'_> {
         let mesh = self.wood.build(&chosen, radius_scale);
         let mut scene = scene_of_wood(&self.tree.model, &mesh);
         let most = (height_px as u32).next_power_of_two().clamp(64, 2048);
-        for image in &mut scene.images {
-            shrink(image, most);
+        let colored = scene.colored_images();
+        for (image, colored) in scene.images.iter_mut().zip(colored) {
+            shrink(image, most, colored);
         }
         scene
     }
@@ -264,7 +264,6 @@ fn wood_scene(surface: &Surface) -> raster::Scene<'_> {
         cutoff: None,
         double_sided: true,
     }];
-    let _ = Material::default();
     raster::Scene {
         geometry: raster::Geometry {
             positions: &surface.positions,

@@ -203,6 +203,31 @@ fn a_package_is_complete_and_says_what_it_holds() {
     }
 }
 
+/// The crate `gltf` validates what it opens, and reads buffers by code that is not ours.
+#[test]
+fn every_level_is_read_by_the_gltf_crate() {
+    let place = Place::new();
+    assert_eq!(place.code("out", &["--levels", "2"]), 0);
+    let out = place.path("out");
+    let text = std::fs::read_to_string(out.join("report.json")).unwrap();
+    let report: Report = serde_json::from_str(&text).unwrap();
+    assert_eq!(report.levels.len(), 2);
+    for level in &report.levels {
+        let file = gltf::Gltf::open(out.join(&level.file)).unwrap();
+        let mut triangles = 0;
+        for primitive in file.meshes().flat_map(|m| m.primitives()) {
+            let reader = primitive.reader(|_| file.blob.as_deref());
+            let points: Vec<_> = reader.read_positions().unwrap().collect();
+            assert_eq!(reader.read_normals().unwrap().count(), points.len());
+            let indices: Vec<u32> = reader.read_indices().unwrap().into_u32().collect();
+            assert!(indices.iter().all(|&i| (i as usize) < points.len()));
+            triangles += indices.len() as u64 / 3;
+        }
+        assert!(triangles > 0);
+        assert_eq!(triangles, level.triangles, "{}", level.file);
+    }
+}
+
 #[test]
 fn all_levels_are_wired_in_one_file() {
     let place = Place::new();

@@ -6,8 +6,9 @@
 
 use serde_json::{Value, json};
 
-use super::gltf::{FileBuilder, Scene};
+use super::gltf::FileBuilder;
 use super::manifest::Range;
+use super::surface::Scene;
 use crate::botany::model::Frame;
 use crate::error::Result;
 use crate::scene;

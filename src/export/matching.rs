@@ -8,7 +8,7 @@
 use rayon::prelude::*;
 
 use super::foliage::Foliage;
-use super::gltf::Surface;
+use super::surface::Surface;
 use crate::space::raster::{Camera, Geometry, Material, Mips, Sampling, Scene, Texture, coverage};
 
 /// What the level should cover.

@@ -3,15 +3,19 @@
 use crate::botany::model::Image;
 use crate::space::texture::{linear, srgb};
 
-/// Halves an image (box filter; colour in linear light, weighted by alpha) until no side is
-/// longer than `most` texels.
-pub fn shrink(image: &mut Image, most: u32) {
+/// Halves an image by a box filter until no side is longer than `most` texels: colours in linear
+/// light, weighted by alpha; other numbers (normals, roughness) as they are.
+pub fn shrink(image: &mut Image, most: u32, colored: bool) {
     while image.width > most || image.height > most {
-        *image = halved(image);
+        *image = if colored {
+            halved(image, linear, srgb)
+        } else {
+            halved(image, |v| f32::from(v) / 255.0, |v| (v * 255.0 + 0.5) as u8)
+        };
     }
 }
 
-fn halved(image: &Image) -> Image {
+fn halved(image: &Image, decode: impl Fn(u8) -> f32, encode: impl Fn(f32) -> u8) -> Image {
     let (w, h) = ((image.width / 2).max(1), (image.height / 2).max(1));
     let mut rgba = Vec::with_capacity((w * h * 4) as usize);
     for y in 0..h {
@@ -23,7 +27,7 @@ fn halved(image: &Image) -> Image {
                 let at = (sy as usize * image.width as usize + sx as usize) * 4;
                 let a = f32::from(image.rgba[at + 3]) / 255.0;
                 for c in 0..3 {
-                    let value = linear(image.rgba[at + c]);
+                    let value = decode(image.rgba[at + c]);
                     color[c] += value * a;
                     plain[c] += value;
                 }
@@ -35,7 +39,7 @@ fn halved(image: &Image) -> Image {
                 } else {
                     plain[c] / 4.0
                 };
-                rgba.push(srgb(value));
+                rgba.push(encode(value));
             }
             rgba.push((alpha / 4.0 * 255.0 + 0.5) as u8);
         }
@@ -66,7 +70,25 @@ mod tests {
             ]
             .concat(),
         };
-        shrink(&mut image, 1);
+        shrink(&mut image, 1, true);
         assert_eq!(image.rgba, [200, 100, 50, 128]);
+    }
+
+    #[test]
+    fn normals_are_averaged_as_numbers_and_colours_as_light() {
+        let texel = |v: u8| [v, v, v, 255];
+        let image = |colored: bool| {
+            let mut image = Image {
+                name: String::new(),
+                width: 2,
+                height: 1,
+                rgba: [texel(0), texel(200)].concat(),
+            };
+            shrink(&mut image, 1, colored);
+            image.rgba[0]
+        };
+        assert_eq!(image(false), 100);
+        // Half the light of 200 (0.578 linear) is 0.289: sRGB 146.
+        assert_eq!(image(true), 146);
     }
 }

@@ -13,4 +13,5 @@ pub mod original;
 pub mod package;
 pub mod project;
 pub mod refine;
+pub mod surface;
 pub mod tangent;
