@@ -22,14 +22,14 @@ use crate::export::surface::scene_of_model;
 use crate::knobs::check;
 pub use crate::ladder::{Limit, Wanted};
 use crate::ladder::{Rung, WHOLE_TREE_TRIANGLES, ranges, rungs};
-use crate::level::{Baker, LevelRequest};
+use crate::level::{Baker, LevelRequest, MASK_HEIGHT};
 use crate::recipe::Recipe;
 use crate::report::band::{Fault, Trunk, faults};
 use crate::report::schema::Report;
 use crate::report::{Judged, Settings, heights, judge};
 use crate::scene::Scene;
 use crate::space::sha256::sha256;
-use crate::watch::{Watch, begin, step};
+use crate::watch::{Watch, begin, part, step};
 
 /// What to bake.
 #[derive(Clone, Debug, Default)]
@@ -63,9 +63,6 @@ pub struct Baked {
     /// What was repaired, guessed or, by `accept`, tolerated.
     pub warnings: Vec<String>,
 }
-
-/// Height of the original's masks in samples.
-const MASK_HEIGHT: f32 = 1024.0;
 
 /// Azimuth of the first view of the report, degrees: not one of those that levels were fitted to.
 const REPORT_OFFSET_DEG: f32 = 11.0;
@@ -190,11 +187,13 @@ fn levels(
                 .triangles_within(pixels, rung.height_px)
                 .max(WHOLE_TREE_TRIANGLES)
         });
-        let made = baker.level(LevelRequest {
+        let level_wanted = LevelRequest {
             triangles: rung.triangles.min(enough),
             height_px: rung.height_px as f32,
             end_px: rung.end_px as f32,
-        });
+        };
+        let made = baker.level(level_wanted, watch)?;
+        part(watch, "encode")?;
         let described = describer.level(level, &(name(level) + ".glb"), &made, range);
         packed.push(Packed {
             name: name(level),
@@ -242,7 +241,8 @@ fn read_back(package: &Package, packed: &[Packed], rungs: &[Rung]) -> Result<Vec
             model: load(&package.file(&file))?,
             file,
             distance_m: level.range.distance_m,
-            heights_px: vec![pixels(rung.height_px), pixels(rung.end_px)],
+            // Where it starts, and at twice that distance.
+            heights_px: vec![pixels(rung.height_px), pixels(rung.height_px / 2.0)],
         })
     };
     packed.iter().zip(rungs).map(read).collect()

@@ -9,6 +9,11 @@ pub trait Watch: Sync {
         let _ = (name, steps);
     }
 
+    /// A part of the current step begins; the part before is over.
+    fn part(&self, name: &str) {
+        let _ = name;
+    }
+
     /// A step of the stage is done.
     fn step(&self) {}
 
@@ -30,6 +35,16 @@ impl Watch for Unwatched {}
 pub fn begin(watch: &dyn Watch, name: &str, steps: u64) -> Result<()> {
     go_on(watch)?;
     watch.stage(name, steps);
+    Ok(())
+}
+
+/// Begins a part of a step, unless the bake should stop.
+///
+/// # Errors
+/// [`Error::Interrupted`].
+pub fn part(watch: &dyn Watch, name: &str) -> Result<()> {
+    go_on(watch)?;
+    watch.part(name);
     Ok(())
 }
 

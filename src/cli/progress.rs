@@ -47,6 +47,7 @@ impl Bars {
         let mut current = self.current.lock().unwrap_or_else(|e| e.into_inner());
         if let Some(bar) = std::mem::replace(&mut *current, next) {
             bar.set_position(bar.length().unwrap_or(0));
+            bar.set_message("");
             bar.finish();
         }
     }
@@ -57,13 +58,21 @@ impl Watch for Bars {
         if self.quiet {
             return;
         }
-        let style = ProgressStyle::with_template("{prefix:>12} {bar:24} {pos}/{len}  {elapsed}")
-            .unwrap_or_else(|_| ProgressStyle::default_bar());
+        let style =
+            ProgressStyle::with_template("{prefix:>12} {bar:24} {pos}/{len}  {elapsed}  {msg}")
+                .unwrap_or_else(|_| ProgressStyle::default_bar());
         let bar = ProgressBar::with_draw_target(Some(steps), ProgressDrawTarget::stderr());
         bar.set_style(style);
         bar.set_prefix(name.to_string());
         bar.enable_steady_tick(Duration::from_millis(200));
         self.replace(Some(bar));
+    }
+
+    fn part(&self, name: &str) {
+        let current = self.current.lock().unwrap_or_else(|e| e.into_inner());
+        if let Some(bar) = &*current {
+            bar.set_message(name.to_string());
+        }
     }
 
     fn step(&self) {

@@ -78,17 +78,48 @@ pub fn whole_tree(model: &Model, elements: &[Element], radius: &[f32], budget: u
                 elements[e as usize].moments.weight * plane.cost(&elements[e as usize].moments, 0.0)
             })
             .sum::<f64>();
-        let triangles: Vec<u32> = members
-            .iter()
-            .flat_map(|&e| elements[e as usize].triangles.iter().copied())
-            .collect();
-        plan.cards.push(CardGroup {
-            card: card(model, plane, &triangles),
-            triangles,
-        });
+        plan.cards.push(group(model, elements, plane, &members));
         plan.members.push(members);
     }
     plan
+}
+
+/// Level cards that show all `members`, each on its nearest: for trees whose best planes are
+/// upright, so that they would vanish from above.
+pub fn level_cards(
+    model: &Model,
+    elements: &[Element],
+    members: &[u32],
+    count: usize,
+) -> LevelPlan {
+    let shown: Vec<Element> = members
+        .iter()
+        .map(|&e| elements[e as usize].clone())
+        .collect();
+    let planes = level_planes(&shown, count);
+    let mut groups = vec![Vec::new(); planes.len()];
+    for (&member, element) in members.iter().zip(&shown) {
+        groups[nearest(&planes, element)].push(member);
+    }
+    let mut plan = LevelPlan::default();
+    for (plane, members) in planes.iter().zip(groups) {
+        if !members.is_empty() {
+            plan.cards.push(group(model, elements, plane, &members));
+            plan.members.push(members);
+        }
+    }
+    plan
+}
+
+fn group(model: &Model, elements: &[Element], plane: &Plane, members: &[u32]) -> CardGroup {
+    let triangles: Vec<u32> = members
+        .iter()
+        .flat_map(|&e| elements[e as usize].triangles.iter().copied())
+        .collect();
+    CardGroup {
+        card: card(model, plane, &triangles),
+        triangles,
+    }
 }
 
 /// A rectangle in the plane; upright cards have level edges, so that nothing leans.

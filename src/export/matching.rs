@@ -1,26 +1,35 @@
 //! Matches a level's covered area to the original's, as an engine renders it.
 //!
-//! Alpha in a plain PNG has two free numbers: the threshold that decides which texels are opaque,
-//! and the alpha of the others, a floor below the cutoff. The threshold sets the area from near,
-//! where the base level is read; the floor sets it from far, where box-filtered mips mix both and
-//! leaves would otherwise dissolve. Both are found by rendering the level with the packed atlas.
+//! Alpha in a plain PNG has two free numbers. The threshold decides which texels are opaque, and
+//! sets the area seen from near, where the base level is read. The contrast decides what box
+//! filtered mips do with it from afar: a floor under the cutoff keeps sparse leaves from
+//! dissolving, a ceiling over it keeps dense ones from closing up. For every contrast there is one
+//! threshold that gives the right area near; the contrast is searched whose area at the level's
+//! own distance and at twice it errs as little to one side as to the other.
 
 use rayon::prelude::*;
 
 use super::foliage::Foliage;
 use super::surface::Surface;
-use crate::space::raster::{Camera, Geometry, Material, Mips, Sampling, Scene, Texture, coverage};
+use crate::space::raster::{
+    Camera, Geometry, Material, Mips, Sampling, Scene, Texture, coverage, coverage_multisampled,
+};
+use crate::space::root::Search;
 
 /// What the level should cover.
 #[derive(Clone, Debug)]
 pub struct AreaGoal {
-    /// Cameras at the near end of the level's range.
+    /// Cameras that see the base level of the atlas.
     pub near: Vec<Camera>,
     /// The original's covered area in pixels, summed over the near cameras.
     pub near_area: f64,
-    /// Cameras at the far end of the level's range.
+    /// Cameras where the level starts.
+    pub own: Vec<Camera>,
+    /// The original's covered area in pixels, summed over them.
+    pub own_area: f64,
+    /// Cameras at twice that distance.
     pub far: Vec<Camera>,
-    /// The original's covered area in pixels, summed over the far cameras.
+    /// The original's covered area in pixels, summed over them.
     pub far_area: f64,
 }
 
@@ -29,25 +38,40 @@ pub struct AreaGoal {
 pub struct Matched {
     /// Score from which a texel is opaque.
     pub threshold: f32,
-    /// Alpha of the other texels, 0 to 127.
-    pub floor: u8,
-    /// Covered area over the original's at the near end, supersampled.
+    /// Positive: alpha of the other texels; negative: what opaque texels lack of 255.
+    pub contrast: i32,
+    /// Covered area over the original's, supersampled from the base level.
     pub near_ratio: f64,
-    /// Covered area over the original's at the far end, one sample a pixel.
+    /// Covered area over the original's where the level starts, as a client draws it.
+    pub own_ratio: f64,
+    /// The same at twice the distance.
     pub far_ratio: f64,
 }
 
-/// Near areas are compared at 2 x 2 samples: over many views their error is below one per mille.
+impl Matched {
+    /// Alpha of opaque texels and of the others.
+    pub fn alphas(&self) -> [u8; 2] {
+        [
+            (255 + self.contrast.min(0)) as u8,
+            self.contrast.max(0) as u8,
+        ]
+    }
+}
+
+/// One sample a pixel of the base level: over many views the area's error is below two per mille.
 const NEAR: Sampling = Sampling {
-    side: 2,
+    side: 1,
     mips: Mips::Base,
 };
 
-/// Times that threshold and floor are found in turn.
-const ROUNDS: u32 = 4;
+/// Near areas this close are the same.
+const NEAR_TOLERANCE: f64 = 1e-3;
 
-/// Highest floor: under the cutoff of 128 with room for rounding in mips.
-const HIGHEST_FLOOR: u8 = 120;
+/// Areas from afar this close are the same.
+const FAR_TOLERANCE: f64 = 4e-3;
+
+/// Both alphas stay this far from the cutoff of 128: room for rounding in mips.
+const HIGHEST_CONTRAST: f64 = 120.0;
 
 /// Sets the alpha of `foliage` from `score` so that cards and `wood` together cover what the
 /// original covers.
@@ -57,7 +81,6 @@ pub fn match_area(
     wood: &[Surface],
     goal: &AreaGoal,
 ) -> Matched {
-    let mut level = LevelScene::new(foliage, wood);
     let mut found = Matched {
         threshold: 0.5,
         ..Matched::default()
@@ -65,50 +88,49 @@ pub fn match_area(
     if foliage.charts.is_empty() {
         return found;
     }
-    // Each number moves the other's area a little; the threshold has the last word, because what
-    // is near is seen best.
-    let mut aim = goal.far_area;
-    for round in 0..ROUNDS {
-        if round > 0 {
-            // The threshold that follows takes some of the far area away again: aim above it.
-            let far = level.far(foliage, score, found, goal);
-            aim *= (goal.far_area / far.max(1e-9)).clamp(0.8, 1.25);
-            found.floor = level.floor(foliage, score, found, goal, aim);
-        }
+    let mut level = LevelScene::new(foliage, wood);
+    let search = Search {
+        range: [-HIGHEST_CONTRAST, HIGHEST_CONTRAST],
+        guess: 32.0,
+        step: 16.0,
+        grain: 2.0,
+        tolerance: FAR_TOLERANCE,
+    };
+    search.falling(|contrast| {
+        found.contrast = contrast.round() as i32;
         found.threshold = level.threshold(foliage, score, found, goal);
-    }
-    apply(foliage, score, found);
-    found.near_ratio = level.area(foliage, &goal.near, NEAR) / goal.near_area.max(1e-9);
-    let far = level.area(foliage, &goal.far, Sampling::CLIENT);
-    found.far_ratio = far / goal.far_area.max(1e-9);
+        apply(foliage, score, found);
+        found.own_ratio = level.client_area(foliage, &goal.own) / goal.own_area.max(1e-9);
+        found.far_ratio = level.client_area(foliage, &goal.far) / goal.far_area.max(1e-9);
+        1.0 - (found.own_ratio + found.far_ratio) / 2.0
+    });
+    found.near_ratio = level.near_area(foliage, &goal.near) / goal.near_area.max(1e-9);
     found
 }
 
 fn apply(foliage: &mut Foliage, score: &[f32], found: Matched) {
-    for (alpha, &s) in foliage.alpha.iter_mut().zip(score) {
-        *alpha = if s >= found.threshold {
-            255
-        } else {
-            found.floor
+    let [opaque, other] = found.alphas();
+    let texels = score.iter().zip(&foliage.owned);
+    for (alpha, (&score, &owned)) in foliage.alpha.iter_mut().zip(texels) {
+        // Texels of no chart stay empty: they would only bleed into the mips of their neighbours.
+        *alpha = match owned {
+            false => 0,
+            true if score >= found.threshold => opaque,
+            true => other,
         };
-    }
-    // Texels of no chart stay empty: they would only bleed into the mips of their neighbours.
-    for (alpha, &owned) in foliage.alpha.iter_mut().zip(&foliage.owned) {
-        if !owned {
-            *alpha = 0;
-        }
     }
 }
 
 /// Cards and wood in one mesh for the raster; only alpha changes between renderings.
-struct LevelScene {
+pub struct LevelScene {
     surface: Surface,
     materials: Vec<u32>,
     textures: [Texture; 1],
 }
 
 impl LevelScene {
-    fn new(foliage: &Foliage, wood: &[Surface]) -> Self {
+    /// Cards first, then the wood.
+    pub fn new(foliage: &Foliage, wood: &[Surface]) -> Self {
         let mut surface = foliage.surface();
         let mut materials = vec![0; surface.triangles.len()];
         for part in wood {
@@ -128,7 +150,7 @@ impl LevelScene {
         }
     }
 
-    /// The threshold at which the near area is the original's, by bisection.
+    /// The threshold at which the near area is the original's.
     fn threshold(
         &mut self,
         foliage: &mut Foliage,
@@ -136,54 +158,40 @@ impl LevelScene {
         mut found: Matched,
         goal: &AreaGoal,
     ) -> f32 {
-        let (mut low, mut high) = (-0.6f32, 1.6f32);
-        for _ in 0..9 {
-            found.threshold = (low + high) / 2.0;
+        let search = Search {
+            range: [-0.6, 1.6],
+            guess: f64::from(found.threshold),
+            step: 0.05,
+            grain: 0.002,
+            tolerance: NEAR_TOLERANCE * goal.near_area,
+        };
+        search.falling(|threshold| {
+            found.threshold = threshold as f32;
             apply(foliage, score, found);
-            if self.area(foliage, &goal.near, NEAR) > goal.near_area {
-                low = found.threshold;
-            } else {
-                high = found.threshold;
-            }
-        }
-        (low + high) / 2.0
+            self.near_area(foliage, &goal.near) - goal.near_area
+        }) as f32
     }
 
-    /// The covered area at the far end.
-    fn far(
+    /// Covered pixels of all cameras, supersampled from the base level.
+    pub fn near_area(&mut self, foliage: &Foliage, cameras: &[Camera]) -> f64 {
+        self.area(foliage, cameras, |scene, camera| {
+            coverage(scene, camera, NEAR).area()
+        })
+    }
+
+    /// Covered pixels of all cameras as a client draws them.
+    fn client_area(&mut self, foliage: &Foliage, cameras: &[Camera]) -> f64 {
+        self.area(foliage, cameras, |scene, camera| {
+            coverage_multisampled(scene, camera).area()
+        })
+    }
+
+    fn area(
         &mut self,
-        foliage: &mut Foliage,
-        score: &[f32],
-        found: Matched,
-        goal: &AreaGoal,
+        foliage: &Foliage,
+        cameras: &[Camera],
+        draw: impl Fn(&Scene, &Camera) -> f64 + Sync,
     ) -> f64 {
-        apply(foliage, score, found);
-        self.area(foliage, &goal.far, Sampling::CLIENT)
-    }
-
-    /// The least floor at which the far area reaches `aim`, by bisection.
-    fn floor(
-        &mut self,
-        foliage: &mut Foliage,
-        score: &[f32],
-        mut found: Matched,
-        goal: &AreaGoal,
-        aim: f64,
-    ) -> u8 {
-        let (mut low, mut high) = (0u8, HIGHEST_FLOOR);
-        while low < high {
-            found.floor = low + (high - low) / 2;
-            apply(foliage, score, found);
-            if self.area(foliage, &goal.far, Sampling::CLIENT) < aim {
-                low = found.floor + 1;
-            } else {
-                high = found.floor;
-            }
-        }
-        low
-    }
-
-    fn area(&mut self, foliage: &Foliage, cameras: &[Camera], sampling: Sampling) -> f64 {
         self.textures[0].set_alpha(&foliage.alpha);
         let cards = Material {
             texture: Some(0),
@@ -210,7 +218,7 @@ impl LevelScene {
         };
         let areas: Vec<f64> = cameras
             .par_iter()
-            .map(|camera| coverage(&scene, camera, sampling).area())
+            .map(|camera| draw(&scene, camera))
             .collect();
         areas.iter().sum()
     }

@@ -74,7 +74,35 @@ pub fn refine(foliage: &Foliage, targets: &[Target], options: Refine) -> Vec<f32
             }
         }
     }
+    follow_neighbours(&mut score, foliage);
     score
+}
+
+/// Share of its neighbours' mean that a texel takes over.
+const NEIGHBOURS: f32 = 0.1;
+
+/// Ranks texels of equal score by their neighbours: where all views see other things in front of
+/// a texel it has no vote, and a threshold could take only all of these or none.
+fn follow_neighbours(score: &mut [f32], foliage: &Foliage) {
+    let width = foliage.size[0] as usize;
+    let mut before = vec![0.0f32; score.len()];
+    for _ in 0..3 {
+        before.copy_from_slice(score);
+        let rows = score.par_chunks_mut(width).enumerate();
+        rows.for_each(|(y, row)| {
+            for (x, value) in row.iter_mut().enumerate() {
+                if !foliage.owned[y * width + x] {
+                    continue;
+                }
+                let near = |at: usize, end: usize| at.saturating_sub(1)..(at + 2).min(end);
+                let cells = near(y, before.len() / width)
+                    .flat_map(|v| near(x, width).map(move |u| v * width + u))
+                    .filter(|&at| foliage.owned[at]);
+                let (sum, count) = cells.fold((0.0, 0.0), |(s, n), at| (s + before[at], n + 1.0));
+                *value += NEIGHBOURS / 3.0 * (sum / count - *value);
+            }
+        });
+    }
 }
 
 /// How many opaque texels each cell sees, at most 255.

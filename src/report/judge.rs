@@ -58,15 +58,14 @@ pub fn judge(
     for height_px in heights(levels) {
         let reference = Reference::of(&own, original.0, &views, height_px);
         if let Some(row) = &mut report.original {
-            row.sizes
-                .push(reference.compare_drawable(&own, Sampling::CLIENT));
+            row.sizes.push(reference.compare_client(&own));
         }
         for ((row, level), drawable) in report.levels.iter_mut().zip(levels).zip(&drawables) {
             if !level.heights_px.contains(&height_px) {
                 continue;
             }
             let mut figures = reference.compare_drawable(drawable, Sampling::REFERENCE);
-            let client = reference.compare_drawable(drawable, Sampling::CLIENT);
+            let client = reference.compare_client(drawable);
             figures.client = Some(Box::new(client));
             row.sizes.push(figures);
         }

@@ -8,6 +8,7 @@ pub mod hull;
 mod min_triangle;
 pub mod polyline;
 pub mod raster;
+pub mod root;
 pub mod sha256;
 pub mod texture;
 pub mod view;

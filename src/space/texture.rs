@@ -1,5 +1,7 @@
 //! Reading textures: wrap modes, nearest texels, the alpha test that applies.
 
+use std::sync::LazyLock;
+
 use glam::Vec2;
 
 use crate::botany::model::{AlphaMode, Image, Material, Wrap};
@@ -29,9 +31,9 @@ pub fn nearest(image: &Image, wrap: [Wrap; 2], uv: Vec2) -> [u8; 4] {
 
 fn wrap_texel(coordinate: f32, size: u32, wrap: Wrap) -> u32 {
     let turned = match wrap {
-        Wrap::Repeat => coordinate - coordinate.floor(),
+        Wrap::Repeat => coordinate - below(coordinate),
         Wrap::Mirror => {
-            let t = (coordinate * 0.5 - (coordinate * 0.5).floor()) * 2.0;
+            let t = (coordinate * 0.5 - below(coordinate * 0.5)) * 2.0;
             if t > 1.0 { 2.0 - t } else { t }
         }
         Wrap::Clamp => coordinate.clamp(0.0, 1.0),
@@ -39,8 +41,24 @@ fn wrap_texel(coordinate: f32, size: u32, wrap: Wrap) -> u32 {
     ((turned * size as f32) as u32).min(size - 1)
 }
 
+/// `floor` is a call into the C library on plain x86-64; numbers of 2^23 and more are whole.
+fn below(x: f32) -> f32 {
+    if x.abs() < 8_388_608.0 {
+        let whole = x as i32 as f32;
+        whole - f32::from(u8::from(whole > x))
+    } else {
+        x
+    }
+}
+
 /// sRGB byte to linear.
 pub fn linear(byte: u8) -> f32 {
+    static TABLE: LazyLock<[f32; 256]> =
+        LazyLock::new(|| std::array::from_fn(|byte| decoded(byte as u8)));
+    TABLE[usize::from(byte)]
+}
+
+fn decoded(byte: u8) -> f32 {
     let c = f32::from(byte) / 255.0;
     if c <= 0.04045 {
         c / 12.92

@@ -1,0 +1,205 @@
+//! The texels of a level: projected, fitted to the original's silhouettes, matched in area.
+
+use glam::Vec2;
+
+use super::{Baker, Level, LevelRequest, WHOLE_TREE_TRIANGLES};
+use crate::detail::level::LevelPlan;
+use crate::error::Result;
+use crate::export::foliage::{BakeOptions, Foliage};
+use crate::export::matching::{AreaGoal, LevelScene, Matched, match_area};
+use crate::export::mip::shrink;
+use crate::export::original::{Original, camera};
+use crate::export::refine::{Refine, refine};
+use crate::export::surface::{Scene, Surface, scene_of_wood};
+use crate::space::raster::{self, Camera};
+use crate::watch::{Watch, part};
+
+/// Height of the original's masks in samples.
+pub const MASK_HEIGHT: f32 = 1024.0;
+
+/// Height of the tree in pixels where the supersampled area is matched: it hardly depends on it.
+const NEAR_HEIGHT_PX: f32 = 320.0;
+
+/// Of the training directions every third one is matched in area.
+const MATCHED: usize = 3;
+
+/// Times that the wood's radius is tried.
+const WOOD_TRIES: u32 = 4;
+
+/// Excess of the covered area that is left alone.
+const WOOD_TOLERANCE: f64 = 0.005;
+
+/// A plan with its wood and texels.
+pub struct Fitted {
+    plan: LevelPlan,
+    wood: Scene,
+    foliage: Foliage,
+    matched: Matched,
+}
+
+impl Baker<'_> {
+    /// Gives a plan its wood and texels.
+    pub(super) fn fit(
+        &self,
+        plan: LevelPlan,
+        request: LevelRequest,
+        watch: &dyn Watch,
+    ) -> Result<Fitted> {
+        let whole = request.triangles <= WHOLE_TREE_TRIANGLES;
+        // Levels are looked at from nearer than they are made for: never fewer texels than this.
+        let texels_px = request.height_px.max(if whole { 64.0 } else { 256.0 });
+        let density = texels_px / self.original.height * self.recipe.texel_density;
+        part(watch, "project")?;
+        let mut foliage = Foliage::bake(
+            &self.tree.model,
+            &plan.cards,
+            BakeOptions {
+                density,
+                pad: self.recipe.gutter_texels,
+                samples: self.recipe.samples,
+            },
+        );
+        let goal = self.goal(request.height_px);
+        // Cells about as large as texels: finer ones cost as their square, and no texel can follow.
+        let pool = (MASK_HEIGHT / texels_px).round().clamp(2.0, 4.0) as u32;
+        // Where the wood alone covers more than the original, no alpha can make up for it (bare
+        // trees): then the tubes become thinner, and the cards are fitted again.
+        let mut radius_scale = 1.0f32;
+        let mut tries = 0;
+        loop {
+            part(watch, "wood")?;
+            let wood = self.wood(&plan, request.height_px, radius_scale);
+            let taken = merge_wood(&wood);
+            let targets = self.original.targets(pool, Some(&wood_scene(&taken)));
+            part(watch, "fit texels")?;
+            let options = Refine {
+                rounds: self.recipe.refine_rounds,
+                weight: 1.0,
+            };
+            let score = refine(&foliage, &targets, options);
+            part(watch, "match area")?;
+            let matched = match_area(&mut foliage, &score, &wood.surfaces, &goal);
+            tries += 1;
+            let over = matched.near_ratio;
+            if tries == WOOD_TRIES || plan.tubes.is_empty() || over <= 1.0 + WOOD_TOLERANCE {
+                return Ok(Fitted {
+                    plan,
+                    wood,
+                    foliage,
+                    matched,
+                });
+            }
+            radius_scale /= over.min(1.25) as f32;
+        }
+    }
+
+    /// What the level should cover where the tree is `height_px` high, and from afar.
+    fn goal(&self, height_px: f32) -> AreaGoal {
+        let area: f64 = self.original.areas().iter().step_by(MATCHED).sum();
+        let directions = || self.original.directions.iter().step_by(MATCHED);
+        let seen = |pixels: f32| -> (Vec<Camera>, f64) {
+            let unit = pixels / self.original.height;
+            let cameras = directions().map(|d| camera(d, unit)).collect();
+            (cameras, area * f64::from(unit * unit))
+        };
+        let (near, near_area) = seen(NEAR_HEIGHT_PX);
+        let (own, own_area) = seen(height_px);
+        let (far, far_area) = seen(height_px / 2.0);
+        AreaGoal {
+            near,
+            near_area,
+            own,
+            own_area,
+            far,
+            far_area,
+        }
+    }
+
+    /// The wood that the plan draws as geometry, its textures no finer than the level needs.
+    fn wood(&self, plan: &LevelPlan, height_px: f32, radius_scale: f32) -> Scene {
+        let mut chosen = vec![None; self.wood.len()];
+        for &(element, choice) in &plan.tubes {
+            if let Some(chain) = self.elements[element as usize].chain {
+                chosen[chain as usize] = Some(choice as usize);
+            }
+        }
+        let mesh = self.wood.build(&chosen, radius_scale);
+        let mut scene = scene_of_wood(&self.tree.model, &mesh);
+        let most = (height_px as u32).next_power_of_two().clamp(64, 2048);
+        let colored = scene.colored_images();
+        for (image, colored) in scene.images.iter_mut().zip(colored) {
+            shrink(image, most, colored);
+        }
+        scene
+    }
+}
+
+impl Fitted {
+    /// The least covered area of all training views, over the original's.
+    pub(super) fn least_view(&self, original: &Original) -> f64 {
+        let unit = NEAR_HEIGHT_PX / original.height;
+        let mut level = LevelScene::new(&self.foliage, &self.wood.surfaces);
+        let ratios = original.directions.iter().zip(original.areas());
+        ratios
+            .map(|(direction, area)| {
+                let covered = level.near_area(&self.foliage, &[camera(direction, unit)]);
+                covered / (area * f64::from(unit * unit)).max(1e-9)
+            })
+            .fold(f64::MAX, f64::min)
+    }
+
+    /// Bleeds the texels and joins wood and cards.
+    pub(super) fn level(mut self) -> Level {
+        self.foliage.bleed();
+        let mut scene = self.wood;
+        let mut surface = self.foliage.surface();
+        surface.material = scene.materials.len() as u32;
+        let material = self.foliage.material(scene.images.len() as u32);
+        scene.materials.push(material);
+        scene.images.extend(self.foliage.images());
+        scene.surfaces.push(surface);
+        Level {
+            scene,
+            plan: self.plan,
+            matched: self.matched,
+            charts: self.foliage.charts,
+            atlas: self.foliage.size,
+        }
+    }
+}
+
+fn merge_wood(scene: &Scene) -> Surface {
+    let mut out = Surface::default();
+    for s in &scene.surfaces {
+        let base = out.positions.len() as u32;
+        out.positions.extend(&s.positions);
+        out.uvs[0].resize(out.positions.len(), Vec2::ZERO);
+        out.triangles
+            .extend(s.triangles.iter().map(|t| t.map(|i| i + base)));
+    }
+    out
+}
+
+fn wood_scene(surface: &Surface) -> raster::Scene<'_> {
+    const OPAQUE: [raster::Material; 1] = [raster::Material {
+        texture: None,
+        uv_set: 0,
+        wrap: [raster::Wrap::Repeat; 2],
+        linear: true,
+        factor: [1.0; 4],
+        cutoff: None,
+        double_sided: true,
+    }];
+    raster::Scene {
+        geometry: raster::Geometry {
+            positions: &surface.positions,
+            normals: &[],
+            uvs: [&surface.uvs[0], &[]],
+            colors: &[],
+            triangles: &surface.triangles,
+            triangle_material: &[],
+        },
+        materials: &OPAQUE,
+        textures: &[],
+    }
+}

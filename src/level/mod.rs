@@ -1,0 +1,190 @@
+//! One level of a package: which wood and cards draw it, their texels, and its covered area.
+
+mod fit;
+
+use crate::botany::tree::Tree;
+use crate::cloud::Outline;
+use crate::detail::element::{Element, mean_radius};
+use crate::detail::level::{LevelPlan, Planner};
+use crate::detail::merge::Hierarchy;
+use crate::detail::optimal_cut::{Choice, Pruning};
+use crate::detail::reassign::Reassign;
+use crate::detail::whole_tree::{level_cards, whole_tree};
+use crate::detail::wood::{Wood, WoodOption};
+use crate::error::Result;
+use crate::export::chart::Chart;
+use crate::export::matching::Matched;
+use crate::export::original::Original;
+use crate::export::surface::Scene;
+use crate::recipe::Recipe;
+use crate::watch::{Watch, part};
+
+pub use fit::MASK_HEIGHT;
+
+/// What every level of a tree is baked from.
+pub struct Baker<'a> {
+    /// The tree.
+    pub tree: &'a Tree,
+    /// Its smallest pieces.
+    pub elements: &'a [Element],
+    /// How they merge.
+    pub hierarchy: &'a Hierarchy,
+    /// The branches' tubes.
+    pub wood: &'a Wood<'a>,
+    /// The original's masks.
+    pub original: &'a Original,
+    /// Knobs.
+    pub recipe: &'a Recipe,
+}
+
+/// What one level is for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LevelRequest {
+    /// Most triangles, wood included.
+    pub triangles: u64,
+    /// Height of the tree in pixels where the level starts.
+    pub height_px: f32,
+    /// Height in pixels where it ends and the next one starts.
+    pub end_px: f32,
+}
+
+/// A level, not yet written.
+#[derive(Clone, Debug)]
+pub struct Level {
+    /// What to draw.
+    pub scene: Scene,
+    /// Cards and wood of the cut.
+    pub plan: LevelPlan,
+    /// Threshold and floor of the alpha, and what they gave.
+    pub matched: Matched,
+    /// Where each card lies in the atlas.
+    pub charts: Vec<Chart>,
+    /// Size of the atlas in texels.
+    pub atlas: [u32; 2],
+}
+
+/// Levels of at most so many triangles are whole-tree billboards.
+const WHOLE_TREE_TRIANGLES: u64 = 24;
+
+/// A view that shows less of its area than this vanishes: level cards are added for it.
+const LEAST_VIEW: f64 = 0.92;
+
+/// How many.
+const LEVEL_CARDS: u64 = 4;
+
+impl Baker<'_> {
+    /// Makes one level.
+    ///
+    /// # Errors
+    /// [`Error::Interrupted`](crate::error::Error::Interrupted).
+    pub fn level(&self, request: LevelRequest, watch: &dyn Watch) -> Result<Level> {
+        part(watch, "cut")?;
+        let Some(plan) = self.cut(request.triangles) else {
+            let plan = whole_tree(
+                &self.tree.model,
+                self.elements,
+                &self.radii(),
+                request.triangles,
+            );
+            return Ok(self.fit(plan, request, watch)?.level());
+        };
+        let made = self.fit(plan, request, watch)?;
+        let least = made.least_view(self.original);
+        if least >= LEAST_VIEW {
+            return Ok(made.level());
+        }
+        // Curtains of weeping twigs have upright planes, and seen from above these are lines.
+        part(watch, "cut")?;
+        match self.cut_with_level_cards(request.triangles) {
+            Some(plan) => {
+                let other = self.fit(plan, request, watch)?;
+                let better = other.least_view(self.original) > least;
+                Ok(if better { other } else { made }.level())
+            }
+            None => Ok(made.level()),
+        }
+    }
+
+    /// The cut within a budget; `None`: a whole-tree billboard is all that fits.
+    fn cut(&self, triangles: u64) -> Option<LevelPlan> {
+        let choices = self.choices();
+        let planner = Planner {
+            model: &self.tree.model,
+            elements: self.elements,
+            hierarchy: self.hierarchy,
+            choices: &choices,
+            outline: if self.recipe.triangular_cards {
+                Outline::Triangle
+            } else {
+                Outline::Quad
+            },
+            reassign: Reassign {
+                rounds: self.recipe.reassign_rounds,
+                locality: self.recipe.locality,
+                neighbours: 12,
+            },
+        };
+        match triangles <= WHOLE_TREE_TRIANGLES {
+            true => None,
+            false => planner.plan(triangles),
+        }
+    }
+
+    fn cut_with_level_cards(&self, triangles: u64) -> Option<LevelPlan> {
+        let mut plan = self.cut(triangles.saturating_sub(2 * LEVEL_CARDS))?;
+        let on_cards: Vec<u32> = plan.members.iter().flatten().copied().collect();
+        let level = level_cards(
+            &self.tree.model,
+            self.elements,
+            &on_cards,
+            LEVEL_CARDS as usize,
+        );
+        plan.cards.extend(level.cards);
+        plan.members.extend(level.members);
+        Some(plan)
+    }
+
+    /// Fewest triangles whose error is at most `pixels` where the tree is `height_px` high.
+    pub fn triangles_within(&self, pixels: f64, height_px: f64) -> u64 {
+        let area: f64 = self.elements.iter().map(|e| f64::from(e.area)).sum();
+        let length = pixels / height_px * f64::from(self.original.height);
+        let choices = self.choices();
+        let pruning = Pruning {
+            hierarchy: self.hierarchy,
+            card_error: &self.hierarchy.error,
+            card_triangles: if self.recipe.triangular_cards { 1 } else { 2 },
+            choices: &choices,
+        };
+        pruning.cut_within(area * length * length).triangles
+    }
+
+    fn choices(&self) -> Vec<Vec<Choice>> {
+        let choice = |o: &WoodOption, solid: bool| Choice {
+            triangles: o.triangles,
+            // A thick branch that is a ribbon or left out vanishes from some views: never chosen.
+            error: if solid && !o.is_round() {
+                f64::INFINITY
+            } else {
+                o.error
+            },
+        };
+        let of_chain = |chain: u32, solid: bool| {
+            let options = &self.wood.tube_options(chain).options;
+            let solid = solid && options.iter().any(WoodOption::is_round);
+            options.iter().map(|o| choice(o, solid)).collect()
+        };
+        self.elements
+            .iter()
+            .map(|e| e.chain.map_or(Vec::new(), |chain| of_chain(chain, e.solid)))
+            .collect()
+    }
+
+    /// Mean radius of each element that is wood; 0 for leaves.
+    fn radii(&self) -> Vec<f32> {
+        let mean = |chain| mean_radius(self.tree, chain);
+        self.elements
+            .iter()
+            .map(|e| e.chain.map_or(0.0, mean))
+            .collect()
+    }
+}
