@@ -17,6 +17,25 @@ pub enum Preset {
     Best,
 }
 
+/// How foliage is grouped into billboards.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Method {
+    /// The optimal cut of one hierarchy of planes, and leaves reassigned after it.
+    #[default]
+    OptimalCut,
+    /// Kratt's adaptive loop: groups are kept, merged or split by their coverage (section 3).
+    AdaptiveLoop,
+}
+
+/// A billboard beside the plane that the adaptive loop may choose.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Billboard {
+    /// Two cards that cross on the group's axis.
+    Cross,
+    /// A connected band along the group's axis.
+    Strip,
+}
+
 /// How a tree is baked. Read from RON; keys that are left out keep the preset's value.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -41,6 +60,15 @@ pub struct Recipe {
     pub organs: Vec<OrganRule>,
     /// Outline of a card: one triangle or a rectangle of two.
     pub triangular_cards: bool,
+    /// How foliage is grouped.
+    pub method: Method,
+    /// What the adaptive loop tries where a plane fails. Default: crosses and strips.
+    pub billboards: Vec<Billboard>,
+    /// Distance from its billboard within which the adaptive loop counts a leaf, pixels where the
+    /// level starts, 0.1 to 64.
+    pub validity_px: f64,
+    /// Share of a group's visible area that the adaptive loop may lose, 0 to 1.
+    pub tolerance: f64,
 }
 
 impl Default for Recipe {
@@ -66,6 +94,8 @@ impl Knobs for Recipe {
             range("gutter_texels", self.gutter_texels.into(), 0.0, 16.0),
             range("samples", self.samples.into(), 1.0, 8.0),
             range("refine_rounds", self.refine_rounds.into(), 0.0, 100.0),
+            range("validity_px", self.validity_px, 0.1, 64.0),
+            range("tolerance", self.tolerance, 0.0, 1.0),
             range("training_views", self.training_views.into(), 4.0, 64.0),
         ]
     }
@@ -115,6 +145,10 @@ impl Recipe {
             training_views: 24,
             organs: Vec::new(),
             triangular_cards: true,
+            method: Method::OptimalCut,
+            billboards: vec![Billboard::Cross, Billboard::Strip],
+            validity_px: 3.0,
+            tolerance: 0.2,
         }
     }
 }

@@ -74,7 +74,8 @@ impl Planner<'_> {
         Some(plan)
     }
 
-    fn card(&self, members: &[u32]) -> CardGroup {
+    /// The least-squares card of some elements.
+    pub(super) fn card(&self, members: &[u32]) -> CardGroup {
         let mut moments = Moments::default();
         for &e in members {
             moments = moments.merged(&self.elements[e as usize].moments);
@@ -84,14 +85,19 @@ impl Planner<'_> {
             .flat_map(|&e| self.elements[e as usize].triangles.iter().copied())
             .collect();
         let (u, v) = plane_axes(&moments);
+        let points = self.points(members);
+        let card = Card::around(moments.mean.as_vec3(), u, v, points, self.outline);
+        CardGroup { card, triangles }
+    }
+
+    /// Points whose convex hull holds all that is opaque of some elements.
+    pub(super) fn points(&self, members: &[u32]) -> impl Iterator<Item = Vec3> {
         let leaves = members.iter().map(|&e| &self.elements[e as usize]);
-        let points = leaves.flat_map(|e| {
+        leaves.flat_map(|e| {
             let wood = e.triangles.iter().filter(|_| e.outline.is_empty());
             let corners = wood.flat_map(|&t| self.model.corners(t));
             e.outline.iter().copied().chain(corners)
-        });
-        let card = Card::around(moments.mean.as_vec3(), u, v, points, self.outline);
-        CardGroup { card, triangles }
+        })
     }
 }
 

@@ -1,6 +1,7 @@
 //! STEP 3: billboards become levels of detail.
 
 pub mod adapt;
+pub mod adaptive_level;
 pub mod element;
 pub mod level;
 pub mod merge;

@@ -2,8 +2,12 @@
 
 mod fit;
 
+use glam::Vec3;
+
 use crate::botany::tree::Tree;
-use crate::cloud::Outline;
+use crate::cloud::{Occlusion, Outline};
+use crate::detail::adapt::AdaptOptions;
+use crate::detail::adaptive_level::adaptive_level;
 use crate::detail::element::{Element, mean_radius};
 use crate::detail::level::{LevelPlan, Planner};
 use crate::detail::merge::Hierarchy;
@@ -16,7 +20,7 @@ use crate::export::chart::Chart;
 use crate::export::matching::Matched;
 use crate::export::original::Original;
 use crate::export::surface::Scene;
-use crate::recipe::Recipe;
+use crate::recipe::{Billboard, Method, Recipe};
 use crate::watch::{Watch, part};
 
 pub use fit::MASK_HEIGHT;
@@ -79,7 +83,7 @@ impl Baker<'_> {
     /// [`Error::Interrupted`](crate::error::Error::Interrupted).
     pub fn level(&self, request: LevelRequest, watch: &dyn Watch) -> Result<Level> {
         part(watch, "cut")?;
-        let Some(plan) = self.cut(request.triangles) else {
+        let Some(plan) = self.cut(request) else {
             let plan = whole_tree(
                 &self.tree.model,
                 self.elements,
@@ -95,7 +99,7 @@ impl Baker<'_> {
         }
         // Curtains of weeping twigs have upright planes, and seen from above these are lines.
         part(watch, "cut")?;
-        match self.cut_with_level_cards(request.triangles) {
+        match self.cut_with_level_cards(request) {
             Some(plan) => {
                 let other = self.fit(plan, request, watch)?;
                 let better = other.least_view(self.original) > least;
@@ -106,32 +110,60 @@ impl Baker<'_> {
     }
 
     /// The cut within a budget; `None`: a whole-tree billboard is all that fits.
-    fn cut(&self, triangles: u64) -> Option<LevelPlan> {
+    fn cut(&self, request: LevelRequest) -> Option<LevelPlan> {
+        if request.triangles <= WHOLE_TREE_TRIANGLES {
+            return None;
+        }
         let choices = self.choices();
         let planner = Planner {
             model: &self.tree.model,
             elements: self.elements,
             hierarchy: self.hierarchy,
             choices: &choices,
-            outline: if self.recipe.triangular_cards {
-                Outline::Triangle
-            } else {
-                Outline::Quad
-            },
+            outline: self.outline(),
             reassign: Reassign {
                 rounds: self.recipe.reassign_rounds,
                 locality: self.recipe.locality,
                 neighbours: 12,
             },
         };
-        match triangles <= WHOLE_TREE_TRIANGLES {
-            true => None,
-            false => planner.plan(triangles),
+        let cut = planner.plan(request.triangles)?;
+        let centers: Vec<Vec3> = self.tree.leaves.iter().map(|l| l.center).collect();
+        if self.recipe.method == Method::OptimalCut || centers.is_empty() {
+            return Some(cut);
+        }
+        let tried = |billboard| self.recipe.billboards.contains(&billboard);
+        let normal = AdaptOptions::default();
+        let options = AdaptOptions {
+            epsilon: self.recipe.validity_px / f64::from(request.height_px)
+                * f64::from(self.original.height),
+            tolerance: self.recipe.tolerance,
+            triangles: Some(request.triangles as usize),
+            outline: self.outline(),
+            crosses: tried(Billboard::Cross),
+            strip_sections: match tried(Billboard::Strip) {
+                true => normal.strip_sections,
+                false => 0,
+            },
+            ..normal
+        };
+        let occlusion = Occlusion::of_leaves(&centers, self.tree.model.height());
+        let plan = adaptive_level(&planner, self.tree, &occlusion, cut, options);
+        Some(plan)
+    }
+
+    fn outline(&self) -> Outline {
+        match self.recipe.triangular_cards {
+            true => Outline::Triangle,
+            false => Outline::Quad,
         }
     }
 
-    fn cut_with_level_cards(&self, triangles: u64) -> Option<LevelPlan> {
-        let mut plan = self.cut(triangles.saturating_sub(2 * LEVEL_CARDS))?;
+    fn cut_with_level_cards(&self, request: LevelRequest) -> Option<LevelPlan> {
+        let mut plan = self.cut(LevelRequest {
+            triangles: request.triangles.saturating_sub(2 * LEVEL_CARDS),
+            ..request
+        })?;
         let on_cards: Vec<u32> = plan.members.iter().flatten().copied().collect();
         let level = level_cards(
             &self.tree.model,

@@ -41,7 +41,9 @@ pub struct AdaptOptions {
     pub initial_size: Option<f64>,
     /// Outline of planes and crosses.
     pub outline: Outline,
-    /// Sections that a strip begins with.
+    /// Whether crosses are tried where a plane fails.
+    pub crosses: bool,
+    /// Sections that a strip begins with; under 2: no strip is tried.
     pub strip_sections: usize,
 }
 
@@ -53,6 +55,7 @@ impl Default for AdaptOptions {
             triangles: None,
             initial_size: None,
             outline: Outline::Quad,
+            crosses: true,
             strip_sections: 6,
         }
     }

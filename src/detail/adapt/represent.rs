@@ -52,7 +52,9 @@ pub struct Judgement {
     pub tolerance: f64,
     /// Outline of planes and crosses; strips are quads.
     pub outline: Outline,
-    /// Sections that a strip begins with.
+    /// Whether crosses are tried where a plane fails.
+    pub crosses: bool,
+    /// Sections that a strip begins with; under 2: no strip is tried.
     pub strip_sections: usize,
 }
 
@@ -134,9 +136,13 @@ fn solid_candidates(
         merge_error: judgement.epsilon * MERGE_TO_EPSILON,
     };
     // A strip of one section is a plane with less freedom.
-    let band = strip(foliage, sections).filter(|cards| cards.len() > 1);
+    let band = match judgement.strip_sections {
+        0 | 1 => None,
+        _ => strip(foliage, sections).filter(|cards| cards.len() > 1),
+    };
+    let crossed = judgement.crosses.then(|| cross(foliage, judgement.outline));
     let made = [
-        (Generator::Cross, cross(foliage, judgement.outline)),
+        (Generator::Cross, crossed.flatten()),
         (Generator::Strip, band),
     ];
     made.into_iter()
@@ -221,6 +227,7 @@ mod tests {
             epsilon,
             tolerance: 0.1,
             outline: Outline::Quad,
+            crosses: true,
             strip_sections: 4,
         }
     }

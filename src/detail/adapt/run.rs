@@ -55,6 +55,7 @@ impl Run {
                 epsilon: options.epsilon,
                 tolerance: options.tolerance,
                 outline: options.outline,
+                crosses: options.crosses,
                 strip_sections: options.strip_sections,
             },
             units,
