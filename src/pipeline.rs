@@ -241,8 +241,7 @@ fn read_back(package: &Package, packed: &[Packed], rungs: &[Rung]) -> Result<Vec
             model: load(&package.file(&file))?,
             file,
             distance_m: level.range.distance_m,
-            // Where it starts, and at twice that distance.
-            heights_px: vec![pixels(rung.height_px), pixels(rung.height_px / 2.0)],
+            heights_px: vec![pixels(rung.height_px)],
         })
     };
     packed.iter().zip(rungs).map(read).collect()

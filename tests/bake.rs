@@ -383,6 +383,84 @@ fn an_error_that_may_be_larger_needs_fewer_triangles() {
 }
 
 #[test]
+fn the_adaptive_loop_is_a_choice_of_the_recipe() {
+    let place = Place::new();
+    let recipe = |name: &str, text: &str| {
+        std::fs::write(place.path(name), text).unwrap();
+        let file = place.path(name);
+        let more = ["--triangles", "20%", "--recipe", file.to_str().unwrap()];
+        assert_eq!(place.code(&format!("{name}.out"), &more), 0);
+        let folder = place.path(&format!("{name}.out"));
+        let report = std::fs::read_to_string(folder.join("report.json")).unwrap();
+        let report: Report = serde_json::from_str(&report).unwrap();
+        let level = std::fs::read(folder.join("tree_LOD1.glb")).unwrap();
+        (report.levels[0].clone(), level)
+    };
+    let (cut, cut_file) = recipe("cut.ron", "(method: OptimalCut)");
+    let (crossed, crossed_file) = recipe(
+        "crossed.ron",
+        "(method: AdaptiveLoop, billboards: [Cross], tolerance: 0.05)",
+    );
+    assert_ne!(cut_file, crossed_file);
+    for level in [cut, crossed] {
+        // A fifth of 680 triangles.
+        assert!((10..=136).contains(&level.triangles), "{level:?}");
+        let size = &level.sizes[0];
+        assert!(size.f1.mean > 0.75, "F1 {}", size.f1.mean);
+        assert!((size.area_ratio.mean - 1.0).abs() < 0.05, "{size:?}");
+    }
+    std::fs::write(place.path("wrong.ron"), "(method: Adaptive)").unwrap();
+    let wrong = place.path("wrong.ron");
+    assert_eq!(place.code("w", &["--recipe", wrong.to_str().unwrap()]), 2);
+}
+
+/// 400 hanging blades, square to the horizon and the thinner seen from above: a weeping crown
+/// whose every plane is upright.
+fn curtains(file: &Path) {
+    let mut glb = GlbBuilder::default();
+    let (mut points, mut triangles) = (Vec::new(), Vec::new());
+    for i in 0..400u32 {
+        let turn = i as f32 * 2.399_963;
+        let reach = 2.0 * ((i as f32 + 0.5) / 400.0).sqrt();
+        let middle = Vec3::new(
+            turn.cos() * reach,
+            3.0 + (i % 7) as f32 * 0.2,
+            turn.sin() * reach,
+        );
+        let side = Vec3::new((turn * 3.0).cos(), 0.0, (turn * 3.0).sin()) * 0.12;
+        let lean = Vec3::new(side.z, 0.0, -side.x) * 0.6;
+        let (low, high) = (middle - Vec3::Y * 0.5 + lean, middle + Vec3::Y * 0.5 - lean);
+        let at = points.len() as u32;
+        points.extend([low - side, low + side, high + side, high - side]);
+        triangles.extend([[at, at + 1, at + 2], [at, at + 2, at + 3]]);
+    }
+    let (position, indices) = (
+        glb.positions(&points),
+        glb.indices(&triangles, points.len()),
+    );
+    let root = json!({
+        "asset": { "version": "2.0" }, "scene": 0, "scenes": [{ "nodes": [0] }],
+        "nodes": [{ "mesh": 0 }], "meshes": [{ "primitives": [{
+            "attributes": { "POSITION": position }, "indices": indices, "material": 0 }] }],
+        "materials": [{ "name": "leaf", "doubleSided": true }],
+    });
+    std::fs::write(file, glb.finish(root)).unwrap();
+}
+
+#[test]
+fn a_weeping_tree_does_not_vanish_from_above() {
+    let place = Place::new();
+    curtains(&place.path("tree.glb"));
+    assert_eq!(place.code("out", &["--triangles", "10%"]), 0);
+    let report = std::fs::read_to_string(place.path("out/report.json")).unwrap();
+    let report: Report = serde_json::from_str(&report).unwrap();
+    let views = &report.levels[0].sizes[0].views;
+    let top = views.iter().find(|v| v.view == "top").unwrap();
+    assert!(top.area_ratio > 0.85, "{top:?}");
+    assert!(report.levels[0].triangles <= 80);
+}
+
+#[test]
 fn pipes_are_quiet() {
     let place = Place::new();
     let done = place.bake("out", &["--levels", "1", "--quiet"]);

@@ -223,3 +223,96 @@ impl LevelScene {
         areas.iter().sum()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::{Vec2, Vec3};
+
+    use super::*;
+    use crate::botany::model::Model;
+    use crate::cloud::card::Card;
+    use crate::export::foliage::{BakeOptions, CardGroup};
+    use crate::export::original::camera;
+    use crate::space::directions::direction;
+
+    /// A card of 64 x 64 texels of which a share scores high, in clumps.
+    fn card_with(opaque: impl Fn(u32, u32) -> bool) -> (Foliage, Vec<f32>, f64) {
+        let card = Card::rectangle(Vec3::ZERO, Vec3::X, Vec3::Y, Vec2::splat(0.5));
+        let group = CardGroup {
+            card,
+            triangles: Vec::new(),
+        };
+        let options = BakeOptions {
+            density: 64.0,
+            pad: 1.0,
+            samples: 1,
+        };
+        let foliage = Foliage::bake(&Model::default(), &[group], options);
+        let width = foliage.size[0];
+        let mut wanted = 0;
+        let score = (0..foliage.alpha.len() as u32)
+            .map(|i| {
+                let on = opaque(i % width, i / width) && foliage.owned[i as usize];
+                wanted += u32::from(on);
+                f32::from(u8::from(on)) + 0.001 * (i * 7919 % 97) as f32
+            })
+            .collect();
+        (foliage, score, f64::from(wanted) / (64.0 * 64.0))
+    }
+
+    fn matched(opaque: impl Fn(u32, u32) -> bool) -> Matched {
+        let (mut foliage, score, area) = card_with(opaque);
+        let seen = |pixels: f32| {
+            let camera = camera(&direction(0.0, 0.0), pixels);
+            (vec![camera], area * f64::from(pixels * pixels))
+        };
+        let ((near, near_area), (own, own_area), (far, far_area)) =
+            (seen(320.0), seen(64.0), seen(32.0));
+        let goal = AreaGoal {
+            near,
+            near_area,
+            own,
+            own_area,
+            far,
+            far_area,
+        };
+        match_area(&mut foliage, &score, &[], &goal)
+    }
+
+    /// 0 to 9, alike over 3 x 3 texels.
+    fn clump(x: u32, y: u32) -> u32 {
+        let cell = (x / 3).wrapping_mul(0x9e37_79b9) ^ (y / 3).wrapping_mul(0x85eb_ca6b);
+        (cell ^ (cell >> 15)).wrapping_mul(0x2c1b_3c6d) / 65_536 % 10
+    }
+
+    #[test]
+    fn sparse_leaves_get_a_floor_and_keep_their_area_from_afar() {
+        let found = matched(|x, y| clump(x, y) < 3);
+        assert!(found.contrast > 0, "{found:?}");
+        assert!((found.near_ratio - 1.0).abs() < 0.05, "{found:?}");
+        let mean = (found.own_ratio + found.far_ratio) / 2.0;
+        assert!((mean - 1.0).abs() < 0.1, "{found:?}");
+    }
+
+    #[test]
+    fn dense_leaves_get_a_ceiling_and_do_not_close_up() {
+        let found = matched(|x, y| clump(x, y) < 7);
+        assert!(found.contrast < 0, "{found:?}");
+        assert!((found.near_ratio - 1.0).abs() < 0.05, "{found:?}");
+    }
+
+    #[test]
+    fn alphas_stay_on_their_sides_of_the_cutoff() {
+        for contrast in [-120, -1, 0, 1, 120] {
+            let found = Matched {
+                contrast,
+                ..Matched::default()
+            };
+            let [opaque, other] = found.alphas();
+            assert!(
+                opaque >= 135 && other <= 120,
+                "{contrast}: {opaque} {other}"
+            );
+        }
+    }
+}

@@ -20,7 +20,8 @@ pub const MASK_HEIGHT: f32 = 1024.0;
 /// Height of the tree in pixels where the supersampled area is matched: it hardly depends on it.
 const NEAR_HEIGHT_PX: f32 = 320.0;
 
-/// Of the training directions every third one is matched in area.
+/// Of the training directions every third one is matched in area; every sixth one where the
+/// level is largest on the screen.
 const MATCHED: usize = 3;
 
 /// Times that the wood's radius is tried.
@@ -95,16 +96,17 @@ impl Baker<'_> {
 
     /// What the level should cover where the tree is `height_px` high, and from afar.
     fn goal(&self, height_px: f32) -> AreaGoal {
-        let area: f64 = self.original.areas().iter().step_by(MATCHED).sum();
-        let directions = || self.original.directions.iter().step_by(MATCHED);
-        let seen = |pixels: f32| -> (Vec<Camera>, f64) {
+        let areas = self.original.areas();
+        let seen = |pixels: f32, every: usize| -> (Vec<Camera>, f64) {
             let unit = pixels / self.original.height;
-            let cameras = directions().map(|d| camera(d, unit)).collect();
+            let directions = self.original.directions.iter().step_by(every);
+            let area: f64 = areas.iter().step_by(every).sum();
+            let cameras = directions.map(|d| camera(d, unit)).collect();
             (cameras, area * f64::from(unit * unit))
         };
-        let (near, near_area) = seen(NEAR_HEIGHT_PX);
-        let (own, own_area) = seen(height_px);
-        let (far, far_area) = seen(height_px / 2.0);
+        let (near, near_area) = seen(NEAR_HEIGHT_PX, MATCHED);
+        let (own, own_area) = seen(height_px, 2 * MATCHED);
+        let (far, far_area) = seen(height_px / 2.0, MATCHED);
         AreaGoal {
             near,
             near_area,

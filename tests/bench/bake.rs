@@ -52,26 +52,34 @@ fn four_levels(input: &Path, output: PathBuf, watch: &dyn Watch) -> Baked {
 }
 
 /// Seconds of every stage and part, in order of their first appearance.
-struct Clock {
-    rows: Mutex<(Vec<(String, Duration)>, Instant, usize)>,
+struct Clock(Mutex<Times>);
+
+struct Times {
+    rows: Vec<(String, Duration)>,
+    since: Instant,
+    current: usize,
 }
 
 impl Clock {
     fn new() -> Self {
-        Self {
-            rows: Mutex::new((vec![("start".into(), Duration::ZERO)], Instant::now(), 0)),
-        }
+        Self(Mutex::new(Times {
+            rows: vec![("start".into(), Duration::ZERO)],
+            since: Instant::now(),
+            current: 0,
+        }))
     }
 
     fn enter(&self, name: &str) {
-        let mut rows = self.rows.lock().expect("one thread begins stages");
-        let (all, since, current) = &mut *rows;
-        all[*current].1 += since.elapsed();
-        *since = Instant::now();
-        *current = all.iter().position(|r| r.0 == name).unwrap_or_else(|| {
-            all.push((name.into(), Duration::ZERO));
-            all.len() - 1
-        });
+        let mut times = self.0.lock().expect("one thread begins stages");
+        let current = times.current;
+        let spent = times.since.elapsed();
+        times.rows[current].1 += spent;
+        times.since = Instant::now();
+        let known = times.rows.iter().position(|r| r.0 == name);
+        times.current = known.unwrap_or(times.rows.len());
+        if known.is_none() {
+            times.rows.push((name.into(), Duration::ZERO));
+        }
     }
 }
 
@@ -106,7 +114,7 @@ fn stages() {
     clock.enter("end");
     let limit = limit(&input, &output, &baked);
     println!("\nstage            seconds  share");
-    for (name, time) in &clock.rows.lock().expect("the bake is over").0 {
+    for (name, time) in &clock.0.lock().expect("the bake is over").rows {
         let seconds = time.as_secs_f64();
         if seconds > 0.0 {
             println!("{name:16} {seconds:7.2}  {:4.0} %", 100.0 * seconds / all);

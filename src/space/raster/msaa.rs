@@ -25,8 +25,7 @@ pub fn coverage_multisampled(scene: &Scene, camera: &Camera) -> Coverage {
     let corners = camera.project(scene.geometry.positions, SHADING.side);
     let (width, height) = (camera.width as i32, camera.height as i32);
     let mut hits = vec![0u8; width as usize * height as usize];
-    // The last triangle that was shaded at a pixel, and how its alpha test went.
-    let mut shaded = vec![0u32; hits.len()];
+    let places = PLACES.map(|(x, y)| [x, y].map(|p| p * SUBSAMPLES / 16));
     for (id, indices) in scene.geometry.triangles.iter().enumerate() {
         let material = scene.material(id);
         let at: [Corner; 3] = indices.map(|i| corners[i as usize]);
@@ -34,34 +33,29 @@ pub fn coverage_multisampled(scene: &Scene, camera: &Camera) -> Coverage {
             continue;
         };
         let mut fragment = None;
-        let (failed, passed) = (2 * id as u32 + 1, 2 * id as u32 + 2);
-        for (bit, (x, y)) in PLACES.into_iter().enumerate() {
-            // The scan asks at pixel centres: the triangle moves instead of the sample.
-            let grain = SUBSAMPLES / 16;
-            let moved = triangle.moved((8 - x) * grain, (8 - y) * grain);
-            moved.scan(width, height, |y, from, to| {
-                for x in from..to {
-                    let hit = &mut hits[(y * width + x) as usize];
-                    if *hit & 1 << bit != 0 {
-                        continue;
-                    }
-                    let shaded = &mut shaded[(y * width + x) as usize];
-                    // One shading a pixel, as a client does: the other samples ask for its answer.
-                    if material.cutoff.is_some() && *shaded != failed && *shaded != passed {
-                        let fragment = fragment.get_or_insert_with(|| {
-                            Fragment::new(scene, material, indices, &at, &triangle, SHADING)
-                        });
-                        *shaded = if fragment.passes(x, y) {
-                            passed
-                        } else {
-                            failed
-                        };
-                    }
-                    let seen = material.cutoff.is_none() || *shaded == passed;
-                    *hit |= (seen as u8) << bit;
+        triangle.scan_places(width, height, places, |y, spans| {
+            let inside = |s: &&(i32, i32)| s.0 < s.1;
+            let from = spans.iter().filter(inside).map(|s| s.0).min().unwrap_or(0);
+            let to = spans.iter().filter(inside).map(|s| s.1).max().unwrap_or(0);
+            for x in from..to {
+                let hit = &mut hits[(y * width + x) as usize];
+                let mut here = 0u8;
+                for (bit, span) in spans.iter().enumerate() {
+                    here |= u8::from(span.0 <= x && x < span.1) << bit;
                 }
-            });
-        }
+                // One shading a pixel, as a client does: all its samples share the answer.
+                let seen = here & !*hit != 0
+                    && (material.cutoff.is_none()
+                        || fragment
+                            .get_or_insert_with(|| {
+                                Fragment::new(scene, material, indices, &at, &triangle, SHADING)
+                            })
+                            .passes(x, y));
+                if seen {
+                    *hit |= here;
+                }
+            }
+        });
     }
     Coverage {
         width: camera.width,

@@ -84,16 +84,6 @@ impl Triangle {
         })
     }
 
-    /// The same triangle, moved by sub-samples.
-    pub fn moved(&self, right: i32, down: i32) -> Self {
-        let corners = self.corners.map(|c| Corner {
-            x: c.x + right,
-            y: c.y + down,
-            ..c
-        });
-        Self { corners, ..*self }
-    }
-
     /// How a quantity with these values at the model's corners varies over the screen.
     pub fn plane(&self, values: [f32; 3]) -> Plane {
         let [a, b, c] = &self.corners;
@@ -118,29 +108,56 @@ impl Triangle {
 
     /// Calls `span(y, from, to)` for every row with samples `from..to` inside.
     pub fn scan(&self, width: i32, height: i32, mut span: impl FnMut(i32, i32, i32)) {
+        let center = [[SUBSAMPLES / 2; 2]];
+        self.scan_places(width, height, center, |y, [(from, to)]| {
+            if from < to {
+                span(y, from, to);
+            }
+        });
+    }
+
+    /// As [`Triangle::scan`] with samples at several `places` of each pixel, in sub-samples from
+    /// its left upper corner: `row(y, spans)` gets for each place the pixels `from..to` whose
+    /// sample there is inside; equal ends: none.
+    pub fn scan_places<const N: usize>(
+        &self,
+        width: i32,
+        height: i32,
+        places: [[i32; 2]; N],
+        mut row: impl FnMut(i32, [(i32, i32); N]),
+    ) {
         let [a, b, c] = &self.corners;
-        let (low_x, high_x) = (a.x.min(b.x).min(c.x), a.x.max(b.x).max(c.x));
-        let (low_y, high_y) = (a.y.min(b.y).min(c.y), a.y.max(b.y).max(c.y));
-        // Sample i lies at (i + 1/2) samples.
-        let half = SUBSAMPLES / 2;
-        let first = |low: i32| (low + half - 1).div_euclid(SUBSAMPLES).max(0);
-        let last = |high: i32, size: i32| (high - half).div_euclid(SUBSAMPLES).min(size - 1);
-        let (x0, x1) = (first(low_x), last(high_x, width));
-        let (y0, y1) = (first(low_y), last(high_y, height));
+        let ends = |axis: usize, values: [i32; 3], size: i32| {
+            let [low, high] =
+                [values.iter().min(), values.iter().max()].map(|v| v.map_or(0, |v| *v));
+            let least = places.iter().map(|p| p[axis]).min().unwrap_or(0);
+            let most = places.iter().map(|p| p[axis]).max().unwrap_or(0);
+            (
+                (low - most + SUBSAMPLES - 1).div_euclid(SUBSAMPLES).max(0),
+                (high - least).div_euclid(SUBSAMPLES).min(size - 1),
+            )
+        };
+        let (x0, x1) = ends(0, [a.x, b.x, c.x], width);
+        let (y0, y1) = ends(1, [a.y, b.y, c.y], height);
         if x0 > x1 || y0 > y1 {
             return;
         }
-        let mut edges = [(a, b), (b, c), (c, a)].map(|(from, to)| Edge::new(from, to, x0, y0));
+        let origin = [x0 * SUBSAMPLES, y0 * SUBSAMPLES];
+        let mut all = places.map(|[px, py]| {
+            let at = [origin[0] + px, origin[1] + py];
+            [(a, b), (b, c), (c, a)].map(|(from, to)| Edge::new(from, to, at))
+        });
         for y in y0..=y1 {
-            let (from, to) = if x1 - x0 < SHORT_ROW {
-                step_row(&edges, x1 - x0)
-            } else {
-                solve_row(&edges, x1 - x0)
-            };
-            if from < to {
-                span(y, x0 + from, x0 + to);
-            }
-            for edge in &mut edges {
+            let spans = std::array::from_fn(|i| {
+                let (from, to) = if x1 - x0 < SHORT_ROW {
+                    step_row(&all[i], x1 - x0)
+                } else {
+                    solve_row(&all[i], x1 - x0)
+                };
+                (x0 + from, x0 + to)
+            });
+            row(y, spans);
+            for edge in all.iter_mut().flatten() {
                 edge.value += edge.down;
             }
         }
@@ -165,13 +182,11 @@ struct Edge {
 }
 
 impl Edge {
-    fn new(from: &Corner, to: &Corner, x: i32, y: i32) -> Self {
+    /// At a point in sub-samples.
+    fn new(from: &Corner, to: &Corner, [x, y]: [i32; 2]) -> Self {
         let (dx, dy) = ((to.x - from.x) as i64, (to.y - from.y) as i64);
         let grain = SUBSAMPLES as i64;
-        let (px, py) = (
-            x as i64 * grain + grain / 2 - from.x as i64,
-            y as i64 * grain + grain / 2 - from.y as i64,
-        );
+        let (px, py) = (x as i64 - from.x as i64, y as i64 - from.y as i64);
         // A sample on the edge itself belongs to the triangle whose top or left edge it is.
         let owns = dy < 0 || (dy == 0 && dx > 0);
         Self {
