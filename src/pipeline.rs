@@ -18,7 +18,7 @@ use crate::export::gltf::{encode_images, write_glb};
 use crate::export::manifest::{self, FORMAT, Manifest, Provenance, Range, SUFFIX, VERSION};
 use crate::export::original::Original;
 use crate::export::package::Package;
-use crate::export::surface::scene_of_model;
+use crate::export::surface::{self, scene_of_model};
 use crate::knobs::check;
 pub use crate::ladder::{Limit, Wanted};
 use crate::ladder::{Rung, WHOLE_TREE_TRIANGLES, ranges, rungs};
@@ -172,9 +172,10 @@ fn levels(
         range: ranges[0],
         ..manifest::Level::default()
     });
+    let (pngs, all) = encoded(all)?;
     let mut packed = vec![Packed {
         name: name(0),
-        pngs: encode_images(&all)?,
+        pngs,
         scene: all,
         extras: extras(0, &ranges[0], 0.0, height_m, &request.scene),
         range: ranges[0],
@@ -195,10 +196,11 @@ fn levels(
         let made = baker.level(level_wanted, watch)?;
         part(watch, "encode")?;
         let described = describer.level(level, &(name(level) + ".glb"), &made, range);
+        let (pngs, scene) = encoded(made.scene)?;
         packed.push(Packed {
             name: name(level),
-            pngs: encode_images(&made.scene)?,
-            scene: made.scene,
+            pngs,
+            scene,
             extras: extras(level, &range, described.error_m, height_m, &request.scene),
             range,
         });
@@ -206,6 +208,15 @@ fn levels(
         step(watch)?;
     }
     Ok((packed, manifest))
+}
+
+/// A scene's images as PNG, and the scene without their pixels: all levels wait for the last one.
+fn encoded(mut scene: surface::Scene) -> Result<(Vec<Vec<u8>>, surface::Scene)> {
+    let pngs = encode_images(&scene)?;
+    for image in &mut scene.images {
+        image.rgba = Vec::new();
+    }
+    Ok((pngs, scene))
 }
 
 /// Writes every level alone and all in one; returns the names of the package's files.
@@ -237,8 +248,10 @@ fn read_back(package: &Package, packed: &[Packed], rungs: &[Rung]) -> Result<Vec
     let pixels = |height: f64| (height.round() as u32).max(8);
     let read = |(level, rung): (&Packed, &Rung)| {
         let file = format!("{}.glb", level.name);
+        let mut model = load(&package.file(&file))?;
+        model.keep_only_base_colors();
         Ok(Judged {
-            model: load(&package.file(&file))?,
+            model,
             file,
             distance_m: level.range.distance_m,
             heights_px: vec![pixels(rung.height_px)],

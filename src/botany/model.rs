@@ -196,6 +196,18 @@ impl Model {
         self.triangles[triangle as usize].map(|i| self.positions[i as usize])
     }
 
+    /// Forgets the pixels of images that are no base colour: enough to measure silhouettes and
+    /// costs. Sizes stay.
+    pub fn keep_only_base_colors(&mut self) {
+        let mut kept = vec![false; self.images.len()];
+        for texture in self.materials.iter().filter_map(|m| m.base_color) {
+            kept[texture.image as usize] = true;
+        }
+        for (image, _) in self.images.iter_mut().zip(kept).filter(|(_, kept)| !kept) {
+            image.rgba = Vec::new();
+        }
+    }
+
     /// Height of the tree (extent along y) in normalised units.
     pub fn height(&self) -> f32 {
         let (mut low, mut high) = (f32::MAX, f32::MIN);

@@ -18,6 +18,9 @@ use crate::space::grid::nearest_neighbours;
 /// Neighbours with which an element may merge at first.
 const NEIGHBOURS: usize = 10;
 
+/// A heap of this many merges is not worth cleaning.
+const LEAST_HEAP: usize = 4096;
+
 /// A forest of binary merges. Nodes 0..n are the elements, later nodes are merges, in the order
 /// in which they happened; children come before parents.
 #[derive(Clone, Debug, Default)]
@@ -122,6 +125,8 @@ pub fn merge(elements: &[Element], locality: f64) -> Hierarchy {
             heap.push(Reverse(Merge { cost, a, b }));
         }
     }
+    eprintln!("heap {} near {} {}", heap.len(), near.iter().map(|v| v.capacity()).sum::<usize>(), std::fs::read_to_string("/proc/self/statm").unwrap());
+    let mut most = heap.len().max(LEAST_HEAP);
     loop {
         while let Some(Reverse(Merge { a, b, .. })) = heap.pop() {
             if !alive[a as usize] || !alive[b as usize] {
@@ -149,7 +154,13 @@ pub fn merge(elements: &[Element], locality: f64) -> Hierarchy {
                 let cost = cost_of(&moments, &error, x, c);
                 heap.push(Reverse(Merge { cost, a: x, b: c }));
             }
+            around.shrink_to_fit();
             near.push(around);
+            // Most of what waits has died meanwhile, and would take most of the memory.
+            if heap.len() > 2 * most {
+                heap.retain(|Reverse(m)| alive[m.a as usize] && alive[m.b as usize]);
+                most = heap.len().max(LEAST_HEAP);
+            }
         }
         // The neighbourhood graph may fall into pieces: join each piece to the ones nearest.
         let roots: Vec<u32> = (0..moments.len() as u32)

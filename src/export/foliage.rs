@@ -6,8 +6,9 @@ use rayon::prelude::*;
 use super::atlas;
 use super::chart::Chart;
 use super::edge::bleed;
-use super::project::{Texel, project};
+use super::project::project;
 use super::surface::Surface;
+use super::texel::Stored;
 use crate::botany::model::{AlphaMode, Image, Material, Model, TextureRef, Wrap};
 use crate::cloud::card::Card;
 use crate::space::texture::srgb;
@@ -40,12 +41,15 @@ pub struct Foliage {
     /// Size of the page in texels.
     pub size: [u32; 2],
     /// The page, row by row; colours and normals are already bled into empty texels.
-    pub texels: Vec<Texel>,
+    pub texels: Vec<Stored>,
     /// Whether the texel belongs to a chart.
     pub owned: Vec<bool>,
     /// Final alpha of each texel; set from coverage by [`Foliage::threshold`] or by matching.
     pub alpha: Vec<u8>,
 }
+
+/// Cards that are projected at a time.
+const BATCH: usize = 256;
 
 impl Foliage {
     /// Lays out, packs and projects all cards. Where they don't fit on the largest page, the
@@ -62,20 +66,25 @@ impl Foliage {
                 None => density *= 0.8,
             }
         };
-        let mut texels = vec![Texel::default(); (size[0] * size[1]) as usize];
+        let mut texels = vec![Stored::default(); (size[0] * size[1]) as usize];
         let mut owned = vec![false; texels.len()];
-        let projected: Vec<_> = groups
-            .par_iter()
-            .zip(&mut charts)
-            .map(|(g, chart)| project(model, g.triangles.iter().copied(), chart, options.samples))
-            .collect();
-        for (chart, projection) in charts.iter().zip(projected) {
-            for y in 0..chart.size[1] {
-                for x in 0..chart.size[0] {
-                    if chart.owns(x, y) {
+        // Some cards at a time: projections are several times as large as what is kept of them.
+        let batches = groups.chunks(BATCH).zip(charts.chunks_mut(BATCH));
+        for (groups, charts) in batches {
+            let projected: Vec<_> = groups
+                .par_iter()
+                .zip(&mut *charts)
+                .map(|(g, chart)| {
+                    project(model, g.triangles.iter().copied(), chart, options.samples)
+                })
+                .collect();
+            for (chart, projection) in charts.iter().zip(projected) {
+                for y in 0..chart.size[1] {
+                    for x in (0..chart.size[0]).filter(|&x| chart.owns(x, y)) {
                         let [ax, ay] = chart.in_atlas(x, y);
                         let at = (ay * size[0] + ax) as usize;
-                        texels[at] = projection.texels[(y * chart.size[0] + x) as usize];
+                        let texel = projection.texels[(y * chart.size[0] + x) as usize];
+                        texels[at] = texel.into();
                         owned[at] = true;
                     }
                 }
@@ -97,22 +106,23 @@ impl Foliage {
         self.alpha = self
             .texels
             .iter()
-            .map(|x| if x.coverage >= t { 255 } else { floor })
+            .map(|x| if x.coverage() >= t { 255 } else { floor })
             .collect();
     }
 
     /// Bleeds colours into empty texels; call once, after the last use of `coverage` as it is.
     pub fn bleed(&mut self) {
-        let weights: Vec<f32> = self.texels.iter().map(|t| t.coverage).collect();
-        let fields: [fn(&mut Texel) -> &mut Vec3; 3] =
-            [|t| &mut t.color, |t| &mut t.normal, |t| &mut t.orm];
-        for field in fields {
-            let mut values: Vec<Vec3> = self.texels.iter_mut().map(|t| *field(t)).collect();
+        let weights: Vec<f32> = self.texels.iter().map(Stored::coverage).collect();
+        let mut fill = |get: fn(&Stored) -> Vec3, set: fn(&mut Stored, Vec3)| {
+            let mut values: Vec<Vec3> = self.texels.iter().map(get).collect();
             bleed(&mut values, &weights, self.size);
             for (texel, value) in self.texels.iter_mut().zip(values) {
-                *field(texel) = value;
+                set(texel, value);
             }
-        }
+        };
+        fill(Stored::color, Stored::set_color);
+        fill(Stored::normal, Stored::set_normal);
+        fill(Stored::orm, Stored::set_orm);
     }
 
     /// The cards as a mesh with normals, tangents and atlas coordinates.
@@ -140,7 +150,7 @@ impl Foliage {
 
     /// Base colour with alpha, tangent-space normals, and occlusion-roughness-metalness.
     pub fn images(&self) -> [Image; 3] {
-        let page = |name: &str, pixel: &dyn Fn(&Texel, u8) -> [u8; 4]| Image {
+        let page = |name: &str, pixel: &dyn Fn(&Stored, u8) -> [u8; 4]| Image {
             name: name.into(),
             width: self.size[0],
             height: self.size[1],
@@ -154,14 +164,16 @@ impl Foliage {
         let byte = |v: f32| (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8;
         [
             page("foliage_base_color", &|t, a| {
-                [srgb(t.color.x), srgb(t.color.y), srgb(t.color.z), a]
+                let [r, g, b] = t.color().to_array().map(srgb);
+                [r, g, b, a]
             }),
             page("foliage_normal", &|t, _| {
-                let n = t.normal.normalize_or(Vec3::Z) * 0.5 + 0.5;
+                let n = t.normal().normalize_or(Vec3::Z) * 0.5 + 0.5;
                 [byte(n.x), byte(n.y), byte(n.z), 255]
             }),
             page("foliage_orm", &|t, _| {
-                [byte(t.orm.x), byte(t.orm.y), byte(t.orm.z), 255]
+                let [o, r, m] = t.orm().to_array().map(byte);
+                [o, r, m, 255]
             }),
         ]
     }

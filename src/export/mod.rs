@@ -15,3 +15,4 @@ pub mod project;
 pub mod refine;
 pub mod surface;
 pub mod tangent;
+pub mod texel;

@@ -16,6 +16,7 @@ use rayon::prelude::*;
 
 use super::chart::Chart;
 use super::foliage::Foliage;
+use super::texel::Stored;
 
 /// The original from one direction, on a grid of cells.
 #[derive(Clone, Debug)]
@@ -45,7 +46,7 @@ pub struct Refine {
 
 /// For each texel of the page, the projected coverage corrected by the views' votes.
 pub fn refine(foliage: &Foliage, targets: &[Target], options: Refine) -> Vec<f32> {
-    let mut score: Vec<f32> = foliage.texels.iter().map(|t| t.coverage).collect();
+    let mut score: Vec<f32> = foliage.texels.iter().map(Stored::coverage).collect();
     let mut mean = vec![0.0f32; score.len()];
     for round in 0..options.rounds {
         let on: Vec<bool> = score.iter().map(|&s| s >= 0.5).collect();
@@ -71,7 +72,7 @@ pub fn refine(foliage: &Foliage, targets: &[Target], options: Refine) -> Vec<f32
                     let [ax, ay] = chart.in_atlas(x, y);
                     let at = (ay * foliage.size[0] + ax) as usize;
                     mean[at] += step * (votes[(y * chart.size[0] + x) as usize] - mean[at]);
-                    score[at] = foliage.texels[at].coverage + options.weight * mean[at];
+                    score[at] = foliage.texels[at].coverage() + options.weight * mean[at];
                 }
             }
         }

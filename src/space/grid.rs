@@ -97,7 +97,10 @@ impl<'a> PointGrid<'a> {
         }
         found.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         found.truncate(count);
-        found.into_iter().map(|f| f.1).collect()
+        // Not collected in place: that would keep the room of all that was looked at.
+        let mut nearest = Vec::with_capacity(found.len());
+        nearest.extend(found.iter().map(|f| f.1));
+        nearest
     }
 
     fn visit_ring(&self, middle: IVec3, ring: i32, mut visit: impl FnMut(u32)) {

@@ -51,11 +51,27 @@ fn four_levels(input: &Path, output: PathBuf, watch: &dyn Watch) -> Baked {
     bake(&request, watch).expect("a bake")
 }
 
-/// Seconds of every stage and part, in order of their first appearance.
+/// Time and memory of every stage and part, in order of their first appearance.
 struct Clock(Mutex<Times>);
 
+struct Row {
+    name: String,
+    time: Duration,
+    /// Largest memory of the process while it ran, bytes; 0 where the system doesn't say.
+    peak: u64,
+}
+
+/// The process's largest memory since the last call, bytes (Linux).
+fn peak_memory() -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"));
+    let kilobytes = line.and_then(|l| l.split_whitespace().next()?.parse::<u64>().ok());
+    let _ = std::fs::write("/proc/self/clear_refs", "5");
+    kilobytes.unwrap_or(0) * 1024
+}
+
 struct Times {
-    rows: Vec<(String, Duration)>,
+    rows: Vec<Row>,
     since: Instant,
     current: usize,
 }
@@ -63,7 +79,11 @@ struct Times {
 impl Clock {
     fn new() -> Self {
         Self(Mutex::new(Times {
-            rows: vec![("start".into(), Duration::ZERO)],
+            rows: vec![Row {
+                name: "start".into(),
+                time: Duration::ZERO,
+                peak: 0,
+            }],
             since: Instant::now(),
             current: 0,
         }))
@@ -73,12 +93,17 @@ impl Clock {
         let mut times = self.0.lock().expect("one thread begins stages");
         let current = times.current;
         let spent = times.since.elapsed();
-        times.rows[current].1 += spent;
+        times.rows[current].time += spent;
+        times.rows[current].peak = times.rows[current].peak.max(peak_memory());
         times.since = Instant::now();
-        let known = times.rows.iter().position(|r| r.0 == name);
+        let known = times.rows.iter().position(|r| r.name == name);
         times.current = known.unwrap_or(times.rows.len());
         if known.is_none() {
-            times.rows.push((name.into(), Duration::ZERO));
+            times.rows.push(Row {
+                name: name.into(),
+                time: Duration::ZERO,
+                peak: 0,
+            });
         }
     }
 }
@@ -113,11 +138,16 @@ fn stages() {
     let all = start.elapsed().as_secs_f64();
     clock.enter("end");
     let limit = limit(&input, &output, &baked);
-    println!("\nstage            seconds  share");
-    for (name, time) in &clock.0.lock().expect("the bake is over").rows {
-        let seconds = time.as_secs_f64();
+    println!("\nstage            seconds  share  peak MB");
+    for row in &clock.0.lock().expect("the bake is over").rows {
+        let seconds = row.time.as_secs_f64();
         if seconds > 0.0 {
-            println!("{name:16} {seconds:7.2}  {:4.0} %", 100.0 * seconds / all);
+            println!(
+                "{:16} {seconds:7.2}  {:3.0} %  {:7.0}",
+                row.name,
+                100.0 * seconds / all,
+                row.peak as f64 / 1e6
+            );
         }
     }
     println!("{:16} {all:7.2}", "bake");
