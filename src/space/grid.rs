@@ -29,8 +29,29 @@ impl<'a> PointGrid<'a> {
         };
         let low = if points.is_empty() { Vec3::ZERO } else { low };
         let volume = f64::from(extent.x) * f64::from(extent.y) * f64::from(extent.z);
-        let wanted = (volume * f64::from(per_cell) / points.len().max(1) as f64).cbrt() as f32;
-        let cell = wanted.max(extent.max_element() / MAX_SIDE as f32);
+        let mut wanted = (volume * f64::from(per_cell) / points.len().max(1) as f64).cbrt() as f32;
+        let least = extent.max_element() / MAX_SIDE as f32;
+        let mut grid = Self::binned(points, low, extent, wanted.max(least));
+        // Leaves crowd on twigs and leave most of the box empty: smaller cells, until a point
+        // finds about the wanted number in its own.
+        for _ in 0..3 {
+            let crowd = grid.crowd();
+            if crowd <= 3.0 * per_cell || wanted <= least {
+                break;
+            }
+            wanted *= (per_cell / crowd).cbrt();
+            grid = Self::binned(points, low, extent, wanted.max(least));
+        }
+        grid
+    }
+
+    /// Points that share a point's cell, in the mean over all points.
+    fn crowd(&self) -> f32 {
+        let squares = self.start.windows(2).map(|w| u64::from(w[1] - w[0]).pow(2));
+        squares.sum::<u64>() as f32 / self.points.len().max(1) as f32
+    }
+
+    fn binned(points: &'a [Vec3], low: Vec3, extent: Vec3, cell: f32) -> Self {
         let size = (extent / cell)
             .floor()
             .as_ivec3()
@@ -95,8 +116,12 @@ impl<'a> PointGrid<'a> {
                 break;
             }
         }
-        found.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let order = |a: &(f32, u32), b: &(f32, u32)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
+        if found.len() > count && count > 0 {
+            found.select_nth_unstable_by(count - 1, order);
+        }
         found.truncate(count);
+        found.sort_unstable_by(order);
         // Not collected in place: that would keep the room of all that was looked at.
         let mut nearest = Vec::with_capacity(found.len());
         nearest.extend(found.iter().map(|f| f.1));
