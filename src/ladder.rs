@@ -11,7 +11,7 @@ pub const WHOLE_TREE_TRIANGLES: u64 = 24;
 pub const DEFAULT_LEVELS: usize = 4;
 
 /// The least that a level can be drawn with: three cards of two triangles.
-const LEAST_TRIANGLES: u64 = 6;
+pub const LEAST_TRIANGLES: u64 = 6;
 
 /// How many triangles a level may have.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -59,13 +59,13 @@ pub struct Rung {
     pub end_px: f64,
 }
 
-/// The levels for a tree of `all` triangles, nearest first.
+/// The levels for a tree of `all` triangles, nearest first; none may have fewer than `least`.
 ///
 /// # Errors
 /// [`Error::Usage`] where limits are too small or grow, or the scene has too few heights.
-pub fn rungs(wanted: &Wanted, scene: &Scene, all: u64) -> Result<Vec<Rung>> {
+pub fn rungs(wanted: &Wanted, scene: &Scene, all: u64, least: u64) -> Result<Vec<Rung>> {
     let limits = match wanted {
-        Wanted::Limits(limits) => explicit(limits, all)?,
+        Wanted::Limits(limits) => explicit(limits, all, least)?,
         Wanted::Levels(count) => shares(*count, all),
     };
     let heights = match (scene.heights_px.is_empty(), wanted) {
@@ -82,9 +82,9 @@ pub fn rungs(wanted: &Wanted, scene: &Scene, all: u64) -> Result<Vec<Rung>> {
     Ok(limits.iter().enumerate().map(rung).collect())
 }
 
-fn explicit(limits: &[Limit], all: u64) -> Result<Vec<u64>> {
+fn explicit(limits: &[Limit], all: u64, least: u64) -> Result<Vec<u64>> {
     let counts: Vec<u64> = limits.iter().map(|l| l.triangles(all)).collect();
-    if let Some(i) = counts.iter().position(|&n| n < LEAST_TRIANGLES) {
+    if let Some(i) = counts.iter().position(|&n| n < least) {
         return Err(Error::usage(
             format!(
                 "level {} may have {} of {all} triangles: too few to draw a tree",
@@ -176,7 +176,7 @@ mod tests {
     use super::*;
 
     fn of(wanted: Wanted, all: u64) -> Vec<Rung> {
-        rungs(&wanted, &Scene::default(), all).unwrap()
+        rungs(&wanted, &Scene::default(), all, LEAST_TRIANGLES).unwrap()
     }
 
     #[test]
@@ -201,16 +201,16 @@ mod tests {
         let heights: Vec<f64> = rungs.iter().map(|r| r.height_px).collect();
         assert_eq!(heights, [512.0, 256.0, 64.0, 32.0]);
         let grows = Wanted::Limits(vec![Limit::Count(50), Limit::Share(0.1)]);
-        assert!(super::rungs(&grows, &Scene::default(), 1000).is_err());
+        assert!(super::rungs(&grows, &Scene::default(), 1000, LEAST_TRIANGLES).is_err());
         let tiny = Wanted::Limits(vec![Limit::Share(0.001)]);
-        assert!(super::rungs(&tiny, &Scene::default(), 1000).is_err());
+        assert!(super::rungs(&tiny, &Scene::default(), 1000, LEAST_TRIANGLES).is_err());
         let scene = Scene {
             heights_px: vec![100.0],
             ..Scene::default()
         };
-        assert!(super::rungs(&Wanted::Levels(2), &scene, 1000).is_err());
+        assert!(super::rungs(&Wanted::Levels(2), &scene, 1000, LEAST_TRIANGLES).is_err());
         assert_eq!(
-            super::rungs(&Wanted::Levels(1), &scene, 1000).unwrap()[0].height_px,
+            super::rungs(&Wanted::Levels(1), &scene, 1000, LEAST_TRIANGLES).unwrap()[0].height_px,
             100.0
         );
     }

@@ -20,10 +20,10 @@ use crate::export::original::Original;
 use crate::export::package::Package;
 use crate::export::surface::{self, scene_of_model};
 use crate::knobs::check;
+use crate::ladder::{LEAST_TRIANGLES, Rung, WHOLE_TREE_TRIANGLES, ranges, rungs};
 pub use crate::ladder::{Limit, Wanted};
-use crate::ladder::{Rung, WHOLE_TREE_TRIANGLES, ranges, rungs};
 use crate::level::{Baker, LevelRequest, MASK_HEIGHT};
-use crate::recipe::Recipe;
+use crate::recipe::{Method, Recipe};
 use crate::report::band::{Fault, Trunk, faults};
 use crate::report::schema::Report;
 use crate::report::{Judged, Settings, heights, judge};
@@ -82,6 +82,10 @@ pub fn bake(request: &Request, watch: &dyn Watch) -> Result<Baked> {
         &request.wanted,
         &request.scene,
         model.triangles.len() as u64,
+        match request.recipe.method {
+            Method::CrossedQuads => 4,
+            _ => LEAST_TRIANGLES,
+        },
     )?;
     begin(watch, "recognise", 1)?;
     let organs = request.recipe.organs.clone();

@@ -25,6 +25,9 @@ pub enum Method {
     OptimalCut,
     /// Kratt's adaptive loop: groups are kept, merged or split by their coverage (section 3).
     AdaptiveLoop,
+    /// No grouping: upright rectangles that cross on the tree's axis, two triangles each, as many
+    /// as the limit pays for (at most 32). What others make; here to compare with.
+    CrossedQuads,
 }
 
 /// A billboard beside the plane that the adaptive loop may choose.

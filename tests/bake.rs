@@ -409,6 +409,8 @@ fn the_adaptive_loop_is_a_choice_of_the_recipe() {
         assert!(size.f1.mean > 0.75, "F1 {}", size.f1.mean);
         assert!((size.area_ratio.mean - 1.0).abs() < 0.05, "{size:?}");
     }
+    let (quads, _) = recipe("quads.ron", "(method: CrossedQuads)");
+    assert_eq!(quads.triangles, 64);
     std::fs::write(place.path("wrong.ron"), "(method: Adaptive)").unwrap();
     let wrong = place.path("wrong.ron");
     assert_eq!(place.code("w", &["--recipe", wrong.to_str().unwrap()]), 2);

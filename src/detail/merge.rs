@@ -125,12 +125,6 @@ pub fn merge(elements: &[Element], locality: f64) -> Hierarchy {
             heap.push(Reverse(Merge { cost, a, b }));
         }
     }
-    eprintln!(
-        "heap {} near {} {}",
-        heap.len(),
-        near.iter().map(|v| v.capacity()).sum::<usize>(),
-        std::fs::read_to_string("/proc/self/statm").unwrap()
-    );
     let mut most = heap.len().max(LEAST_HEAP);
     loop {
         while let Some(Reverse(Merge { a, b, .. })) = heap.pop() {

@@ -84,6 +84,31 @@ pub fn whole_tree(model: &Model, elements: &[Element], radius: &[f32], budget: u
     plan
 }
 
+/// What trees are made of where nothing better is at hand: `count` upright rectangles that cross on
+/// the tree's axis at equal angles, each with the whole tree on it. A baseline.
+pub fn crossed_quads(model: &Model, elements: &[Element], count: usize) -> LevelPlan {
+    let all = elements
+        .iter()
+        .fold(Moments::default(), |m, e| m.merged(&e.moments));
+    let members: Vec<u32> = (0..elements.len() as u32).collect();
+    let mut plan = LevelPlan::default();
+    for i in 0..count.max(1) {
+        let angle = std::f64::consts::PI * i as f64 / count.max(1) as f64;
+        let plane = Plane {
+            center: all.mean,
+            normal: DVec3::new(angle.sin(), 0.0, angle.cos()),
+        };
+        plan.error += elements
+            .iter()
+            .map(|e| e.moments.weight * plane.cost(&e.moments, 0.0))
+            .sum::<f64>()
+            / count.max(1) as f64;
+        plan.cards.push(group(model, elements, &plane, &members));
+        plan.members.push(members.clone());
+    }
+    plan
+}
+
 /// Level cards that show all `members`, each on its nearest: for trees whose best planes are
 /// upright, so that they would vanish from above.
 pub fn level_cards(

@@ -11,6 +11,7 @@ use crate::export::mip::shrink;
 use crate::export::original::{Original, camera};
 use crate::export::refine::{Refine, refine};
 use crate::export::surface::{Scene, Surface, scene_of_wood};
+use crate::recipe::Method;
 use crate::space::raster::{self, Camera};
 use crate::watch::{Watch, part};
 
@@ -46,7 +47,8 @@ impl Baker<'_> {
         request: LevelRequest,
         watch: &dyn Watch,
     ) -> Result<Fitted> {
-        let whole = request.triangles <= WHOLE_TREE_TRIANGLES;
+        let whole =
+            request.triangles <= WHOLE_TREE_TRIANGLES && self.recipe.method != Method::CrossedQuads;
         // Levels are looked at from nearer than they are made for: never fewer texels than this.
         let texels_px = request.height_px.max(if whole { 64.0 } else { 256.0 });
         let density = texels_px / self.original.height * self.recipe.texel_density;

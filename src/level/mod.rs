@@ -13,7 +13,7 @@ use crate::detail::level::{LevelPlan, Planner};
 use crate::detail::merge::Hierarchy;
 use crate::detail::optimal_cut::{Choice, Pruning};
 use crate::detail::reassign::Reassign;
-use crate::detail::whole_tree::{level_cards, whole_tree};
+use crate::detail::whole_tree::{crossed_quads, level_cards, whole_tree};
 use crate::detail::wood::{Wood, WoodOption};
 use crate::error::Result;
 use crate::export::chart::Chart;
@@ -73,7 +73,10 @@ const WHOLE_TREE_TRIANGLES: u64 = 24;
 /// A view that shows less of its area than this vanishes: level cards are added for it.
 const LEAST_VIEW: f64 = 0.92;
 
-/// How many.
+/// Most crossed quads of a level.
+const MOST_CROSSED: u64 = 32;
+
+/// How many level cards.
 const LEVEL_CARDS: u64 = 4;
 
 impl Baker<'_> {
@@ -83,6 +86,11 @@ impl Baker<'_> {
     /// [`Error::Interrupted`](crate::error::Error::Interrupted).
     pub fn level(&self, request: LevelRequest, watch: &dyn Watch) -> Result<Level> {
         part(watch, "cut")?;
+        if self.recipe.method == Method::CrossedQuads {
+            let count = (request.triangles / 2).clamp(1, MOST_CROSSED) as usize;
+            let plan = crossed_quads(&self.tree.model, self.elements, count);
+            return Ok(self.fit(plan, request, watch)?.level());
+        }
         let Some(plan) = self.cut(request) else {
             let plan = whole_tree(
                 &self.tree.model,

@@ -5,7 +5,7 @@
 //                  [--views A/E,...] [--around N] [--offset DEGREES] [--fov DEGREES] [--supersampled] [--targets]
 //
 // HEIGHT is the tree's height in pixels (default 256). --package adds all levels of a bake, each where its report.json
-// measured it: at its own height and where the next takes over, half of it, which is twice the distance.
+// measured it, its own height, and at half of that, which is twice the distance.
 // The original is drawn supersampled too, the levels only with --supersampled. Fails if a level is empty from any side,
 // upside down, or of another colour; with --targets also if it misses what the README promises. Prints one JSON object;
 // with DIR it is written there instead, as three.json, beside a sheet of pictures for each height.
@@ -52,7 +52,8 @@ const files = positionals.map((argument) => {
 if (options.package) {
   const { levels } = JSON.parse(readFileSync(join(options.package, 'report.json'), 'utf8'));
   for (const { file, sizes } of levels) {
-    files.push({ file: join(options.package, file), heights: sizes.map((size) => size.height_px) });
+    const heights = sizes.flatMap(({ height_px }) => [height_px, Math.round(height_px / 2)]);
+    files.push({ file: join(options.package, file), heights: [...new Set(heights)] });
   }
 }
 // The original is drawn at every height that a level asks for, at its own only where there are none.
@@ -97,15 +98,15 @@ for (const level of report.levels) {
     const least = Math.min(...result.views.map((view) => view.area_ratio));
     if (!level.original && least < LEAST_AREA) faults.push(`${where}: covers ${least.toFixed(2)} of the original in one view`);
     if (level.original && result.views.some((view) => view.area_px === 0)) faults.push(`${where}: empty`);
+    // What a client makes of the original from afar is not our fault: leaves dissolve, bark and bare mips remain.
+    if (level.original) continue;
     if (result.upright !== null && result.upright < 0) faults.push(`${where}: looks more like the tree upside down`);
     if (result.colour_error.mean > MOST_COLOUR_ERROR) faults.push(`${where}: mean colour is ${result.colour_error.mean.toFixed(1)} off`);
-    if (!options.targets || level.original) continue;
+    if (!options.targets) continue;
     const area = result.area_ratio.mean;
     if (area < TARGET_AREA[0] || area > TARGET_AREA[1]) faults.push(`${where}: covered area ${area.toFixed(3)}`);
     const own = find(level, 'reference', result.height_px).f1.mean;
     if (result.f1.mean < own - TARGET_F1_LOSS) faults.push(`${where}: F1 ${result.f1.mean.toFixed(3)}, supersampled ${own.toFixed(3)}`);
-    const tree = find(report.levels[0], 'client', result.height_px).f1.mean;
-    if (report.levels[0].alpha_cut && result.f1.mean <= tree) faults.push(`${where}: F1 ${result.f1.mean.toFixed(3)}, the original itself has ${tree.toFixed(3)}`);
   }
 }
 report.faults = faults;
