@@ -21,6 +21,9 @@ struct Shown {
     free: bool,
 }
 
+/// Triangles kept back for a card of twigs, where no plane can take them.
+const TWIG_CARD: usize = 2;
+
 /// Replaces the leaves' cards of `cut` by those of the loop. `options.triangles` is the limit of
 /// the whole level.
 pub fn adaptive_level(
@@ -33,7 +36,7 @@ pub fn adaptive_level(
     let wood: u64 = cut.tubes.iter().map(|&t| tube_triangles(planner, t)).sum();
     let limit = options
         .triangles
-        .map(|all| all.saturating_sub(wood as usize));
+        .map(|all| all.saturating_sub(wood as usize + TWIG_CARD));
     let adapted = adapt(
         tree,
         occlusion,
@@ -61,13 +64,23 @@ pub fn adaptive_level(
         members.dedup();
         show(planner, group, members, &mut shown);
     }
+    let mut homeless = Vec::new();
     let twigs = cut.members.iter().flatten().copied();
     for twig in twigs.filter(|&e| planner.elements[e as usize].chain.is_some()) {
         let at = planner.elements[twig as usize].center;
         let free = shown.iter_mut().filter(|s| s.free);
-        if let Some(s) = free.min_by(|a, b| a.card.distance(at).total_cmp(&b.card.distance(at))) {
-            s.members.push(twig);
+        match free.min_by(|a, b| a.card.distance(at).total_cmp(&b.card.distance(at))) {
+            Some(s) => s.members.push(twig),
+            None => homeless.push(twig),
         }
+    }
+    // Strips and single leaves alone: one card for all twigs.
+    if !homeless.is_empty() {
+        shown.push(Shown {
+            card: planner.card(&homeless).card,
+            members: homeless,
+            free: false,
+        });
     }
     let mut plan = LevelPlan {
         tubes: cut.tubes,

@@ -54,7 +54,8 @@ pub fn whole_tree(model: &Model, elements: &[Element], radius: &[f32], budget: u
         .fold(Moments::default(), |m, e| m.merged(&elements[e].moments));
     let through = (trunk.weight > 0.0 && cards - level >= 3).then_some(trunk.mean);
     let upright = upright_planes(elements, cards - level, through);
-    let level = level_planes(elements, level);
+    let all: Vec<&Element> = elements.iter().collect();
+    let level = level_planes(&all, level);
     let mut members = vec![Vec::new(); upright.len() + level.len()];
     for (e, element) in elements.iter().enumerate() {
         let nearest = nearest(&upright, element);
@@ -117,13 +118,10 @@ pub fn level_cards(
     members: &[u32],
     count: usize,
 ) -> LevelPlan {
-    let shown: Vec<Element> = members
-        .iter()
-        .map(|&e| elements[e as usize].clone())
-        .collect();
+    let shown: Vec<&Element> = members.iter().map(|&e| &elements[e as usize]).collect();
     let planes = level_planes(&shown, count);
     let mut groups = vec![Vec::new(); planes.len()];
-    for (&member, element) in members.iter().zip(&shown) {
+    for (&member, element) in members.iter().zip(shown) {
         groups[nearest(&planes, element)].push(member);
     }
     let mut plan = LevelPlan::default();
@@ -240,10 +238,11 @@ fn least_horizontal(m: &Moments, before: DVec3) -> DVec3 {
 }
 
 /// Level planes at the heights where the foliage (or, without foliage, the wood) is.
-fn level_planes(elements: &[Element], count: usize) -> Vec<Plane> {
+fn level_planes(elements: &[&Element], count: usize) -> Vec<Plane> {
     let leafy = elements.iter().any(|e| e.chain.is_none());
     let counted: Vec<&Element> = elements
         .iter()
+        .copied()
         .filter(|e| e.chain.is_none() || !leafy)
         .collect();
     let mut by_height: Vec<(f64, f64)> = counted

@@ -58,7 +58,7 @@ impl Matched {
     }
 }
 
-/// One sample a pixel of the base level: over many views the area's error is below two per mille.
+/// One sample a pixel of the base level: errors at edges cancel over a picture and many views.
 const NEAR: Sampling = Sampling {
     side: 1,
     mips: Mips::Base,
@@ -172,26 +172,31 @@ impl LevelScene {
         }) as f32
     }
 
-    /// Covered pixels of all cameras, supersampled from the base level.
-    pub fn near_area(&mut self, foliage: &Foliage, cameras: &[Camera]) -> f64 {
-        self.area(foliage, cameras, |scene, camera| {
+    /// Covered pixels of each camera, from the base level.
+    pub fn near_areas(&mut self, foliage: &Foliage, cameras: &[Camera]) -> Vec<f64> {
+        self.areas(foliage, cameras, |scene, camera| {
             coverage(scene, camera, NEAR).area()
         })
     }
 
-    /// Covered pixels of all cameras as a client draws them.
-    fn client_area(&mut self, foliage: &Foliage, cameras: &[Camera]) -> f64 {
-        self.area(foliage, cameras, |scene, camera| {
-            coverage_multisampled(scene, camera).area()
-        })
+    fn near_area(&mut self, foliage: &Foliage, cameras: &[Camera]) -> f64 {
+        self.near_areas(foliage, cameras).iter().sum()
     }
 
-    fn area(
+    /// Covered pixels of all cameras as a client draws them.
+    fn client_area(&mut self, foliage: &Foliage, cameras: &[Camera]) -> f64 {
+        let areas = self.areas(foliage, cameras, |scene, camera| {
+            coverage_multisampled(scene, camera).area()
+        });
+        areas.iter().sum()
+    }
+
+    fn areas(
         &mut self,
         foliage: &Foliage,
         cameras: &[Camera],
         draw: impl Fn(&Scene, &Camera) -> f64 + Sync,
-    ) -> f64 {
+    ) -> Vec<f64> {
         self.textures[0].set_alpha(&foliage.alpha);
         let cards = Material {
             texture: Some(0),
@@ -216,11 +221,10 @@ impl LevelScene {
             materials: &[cards, bark],
             textures: &self.textures,
         };
-        let areas: Vec<f64> = cameras
+        cameras
             .par_iter()
             .map(|camera| draw(&scene, camera))
-            .collect();
-        areas.iter().sum()
+            .collect()
     }
 }
 

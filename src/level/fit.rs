@@ -143,12 +143,18 @@ impl Fitted {
     pub(super) fn least_view(&self, original: &Original) -> f64 {
         let unit = NEAR_HEIGHT_PX / original.height;
         let mut level = LevelScene::new(&self.foliage, &self.wood.surfaces);
-        let ratios = original.directions.iter().zip(original.areas());
-        ratios
-            .map(|(direction, area)| {
-                let covered = level.near_area(&self.foliage, &[camera(direction, unit)]);
-                covered / (area * f64::from(unit * unit)).max(1e-9)
-            })
+        let cameras: Vec<Camera> = original
+            .directions
+            .iter()
+            .map(|d| camera(d, unit))
+            .collect();
+        let covered = level.near_areas(&self.foliage, &cameras);
+        let wanted = original.areas();
+        let wanted = wanted.iter().map(|area| area * f64::from(unit * unit));
+        covered
+            .iter()
+            .zip(wanted)
+            .map(|(covered, wanted)| covered / wanted.max(1e-9))
             .fold(f64::MAX, f64::min)
     }
 

@@ -17,7 +17,7 @@ pub struct Judged {
     pub file: String,
     /// Distance from which it is shown, metres.
     pub distance_m: f64,
-    /// Heights of the tree in pixels where the level starts and ends.
+    /// Heights of the tree in pixels at which it is measured; the first is where it starts.
     pub heights_px: Vec<u32>,
 }
 

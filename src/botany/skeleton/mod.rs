@@ -4,6 +4,7 @@
 //! else by level sets of the distance from its base ([`levels`]). Then the base of each part
 //! looks for the branch that carries it ([`join`]).
 
+mod base;
 pub mod join;
 pub mod levels;
 pub mod mesh;

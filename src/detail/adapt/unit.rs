@@ -110,7 +110,7 @@ impl Units {
             subtree,
             connector: node.map(|n| n.position).or(grown).unwrap_or(bounds.0),
             bounds,
-            // The leaf itself for now; `number_leaves` turns it into a range.
+            // The leaf's own number; `number_leaves` replaces it by its place in `order`.
             leaves: leaf as usize..leaf as usize + 1,
             ..Unit::default()
         });
