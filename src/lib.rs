@@ -11,21 +11,38 @@
 //! report  package -> evidence        reads the files back, renders, measures
 //! ```
 
+#[cfg(feature = "bake")]
 pub mod botany;
+#[cfg(feature = "bake")]
 pub mod cli;
+#[cfg(feature = "bake")]
 pub mod cloud;
+#[cfg(feature = "bake")]
 pub mod describe;
+#[cfg(feature = "bake")]
 pub mod detail;
+#[cfg(feature = "bake")]
 pub mod error;
+#[cfg(feature = "bake")]
 pub mod export;
+#[cfg(feature = "bake")]
 pub mod knobs;
+#[cfg(feature = "bake")]
 pub mod ladder;
+#[cfg(feature = "bake")]
 pub mod level;
+#[cfg(feature = "bake")]
 pub mod pipeline;
+#[cfg(feature = "bake")]
 pub mod recipe;
+#[cfg(feature = "bake")]
 pub mod report;
+pub mod runtime;
+#[cfg(feature = "bake")]
 pub mod scene;
 pub mod space;
+#[cfg(feature = "bake")]
 pub mod watch;
 
+#[cfg(feature = "bake")]
 pub use error::{Error, Result};

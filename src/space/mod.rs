@@ -1,8 +1,11 @@
 //! Geometry and rasters that know no botany.
 
 pub mod directions;
+#[cfg(feature = "bake")]
 pub mod eigen;
+#[cfg(feature = "bake")]
 pub mod glb;
+#[cfg(feature = "bake")]
 pub mod grid;
 pub mod hull;
 mod min_triangle;
@@ -10,5 +13,6 @@ pub mod polyline;
 pub mod raster;
 pub mod root;
 pub mod sha256;
+#[cfg(feature = "bake")]
 pub mod texture;
 pub mod view;

@@ -1,0 +1,383 @@
+//! What cells hide along the way from the eye (El-Sana and others 2001, sections 4.2 and 5.2).
+//!
+//! A walk over the integer grid goes from the middle of the eye's cell to the middle of the node's
+//! and sums up how much is hidden, once for each cell and frame at most: while the eye stays in its
+//! cell, no probability changes.
+
+use glam::{IVec3, Vec3};
+
+use super::cells::Cells;
+use super::hierarchy::Node;
+use super::place::Place;
+use super::visibility::{Sight, Visibility};
+
+/// How cells along the way add up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Law {
+    /// Equation 4 as printed: `OP = sum_j rho_j prod_{k<j} t_k` with `t = (1 - rho) exp(-length /
+    /// longest cell diagonal)`, the node's own cell included.
+    ///
+    /// Read closely it says that a long way through a cell makes what comes *behind* count less, even
+    /// where the cell is empty, so that a wall behind air hides little, and that a node is hidden by
+    /// its own cell even from the front.
+    Equation4,
+    /// What the text means ("cells that include longer portions contribute more"): a cell lets
+    /// `(1 - rho)^(length / edge)` pass (Beer's law) and `OP = 1 - prod_{k<i} t_k`; the node's own cell
+    /// doesn't hide it. Empty cells hide nothing, a solid one everything behind it.
+    #[default]
+    Beer,
+}
+
+/// Occlusion probabilities seen from one eye.
+#[derive(Clone, Debug)]
+pub struct Occlusion<'g> {
+    cells: &'g Cells,
+    law: Law,
+    eye: IVec3,
+    /// Number of the eye's cell among those visited, from 1.
+    stamp: u32,
+    /// For each cell the stamp that its probability was computed for.
+    known: Vec<(u32, f32)>,
+    computed: u64,
+}
+
+/// Eyes farther off than this many cells are moved nearer, along the line to the grid's middle.
+const FARTHEST: f32 = 1e6;
+
+impl<'g> Occlusion<'g> {
+    /// Nothing is computed until it is asked for.
+    pub fn new(cells: &'g Cells, law: Law) -> Self {
+        Self {
+            cells,
+            law,
+            eye: IVec3::MIN,
+            stamp: 0,
+            known: vec![(0, 0.0); cells.solidity().len()],
+            computed: 0,
+        }
+    }
+
+    /// Moves the eye; whether probabilities may have changed.
+    pub fn look_from(&mut self, eye: Vec3) -> bool {
+        let cell = self.eye_cell(eye);
+        if cell == self.eye && self.stamp > 0 {
+            return false;
+        }
+        self.eye = cell;
+        self.stamp = self.stamp.wrapping_add(1);
+        if self.stamp == 0 {
+            self.known.fill((0, 0.0));
+            self.stamp = 1;
+        }
+        true
+    }
+
+    fn eye_cell(&self, eye: Vec3) -> IVec3 {
+        let middle = self.cells.low() + 0.5 * self.cells.edge() * self.cells.count().as_vec3();
+        let away = eye - middle;
+        let most = FARTHEST * self.cells.edge().min_element();
+        if !away.is_finite() {
+            return IVec3::splat(-(FARTHEST as i32)); // no such eye: any defined answer
+        }
+        self.cells.cell_of(middle + away.clamp_length_max(most))
+    }
+
+    /// Probability that what is in a point's cell is hidden from the eye, 0 to 1. A point outside
+    /// the grid is treated as the nearest cell's.
+    pub fn probability(&mut self, point: Vec3) -> f32 {
+        let last = self.cells.count() - 1;
+        let cell = self.cells.cell_of(point).clamp(IVec3::ZERO, last);
+        let Some(index) = self.cells.index(cell) else {
+            return 0.0;
+        };
+        let (stamp, value) = self.known[index];
+        if stamp == self.stamp {
+            return value;
+        }
+        self.computed += 1;
+        let value = walk(self.cells, self.eye, cell, self.law);
+        self.known[index] = (self.stamp, value);
+        value
+    }
+
+    /// Walks over the grid so far.
+    pub fn computed(&self) -> u64 {
+        self.computed
+    }
+
+    /// Number that changes with the eye's cell.
+    pub fn stamp(&self) -> u32 {
+        self.stamp
+    }
+}
+
+/// Walks from one cell's middle to another's and returns the occlusion probability there.
+fn walk(cells: &Cells, from: IVec3, to: IVec3, law: Law) -> f32 {
+    let way = to - from;
+    let steps = way.abs();
+    let length = (way.as_vec3() * cells.edge()).length();
+    let unit = match law {
+        Law::Equation4 => cells.edge().length(),
+        Law::Beer => cells.edge().element_sum() / 3.0,
+    };
+    // Crossing number k of an axis is at the share (2 k + 1) / (2 steps) of the way: crossings of
+    // two axes at one corner give the same quotient, so that ties are ties.
+    let crossing = |axis: usize, k: i32| match steps[axis] {
+        0 => f64::INFINITY,
+        n => f64::from(2 * k + 1) / f64::from(2 * n),
+    };
+    let Some(enter) = entry(cells, from, way) else {
+        return 0.0;
+    };
+    // Crossings that lie before the grid are taken in one leap.
+    let mut taken = IVec3::ZERO;
+    for axis in 0..3 {
+        let past = (enter * f64::from(steps[axis]) - 0.5).ceil() as i32;
+        taken[axis] = past.clamp(0, steps[axis]);
+    }
+    let mut at = enter;
+    let (mut hidden, mut passing) = (0.0f32, 1.0f32);
+    loop {
+        let cell = from + way.signum() * taken;
+        let next = [0, 1, 2].map(|axis| crossing(axis, taken[axis]));
+        let end = next[0].min(next[1]).min(next[2]).min(1.0);
+        let last = cell == to || end >= 1.0;
+        let rho = cells.solidity_at(cell);
+        let portion = length * (end - at).max(0.0) as f32 / unit;
+        match law {
+            Law::Equation4 => {
+                hidden += rho * passing;
+                passing *= (1.0 - rho) * (-portion).exp();
+            }
+            Law::Beer if last => {}
+            Law::Beer => {
+                passing *= if rho >= 1.0 {
+                    0.0
+                } else {
+                    (1.0 - rho).powf(portion)
+                };
+                hidden = 1.0 - passing;
+            }
+        }
+        if last || passing <= 0.0 {
+            return hidden.clamp(0.0, 1.0);
+        }
+        at = end;
+        for axis in 0..3 {
+            taken[axis] += i32::from(next[axis] <= end);
+        }
+    }
+}
+
+/// Share of the way from one cell's middle to another's at which it enters the grid; `None` where it
+/// ends before.
+fn entry(cells: &Cells, from: IVec3, way: IVec3) -> Option<f64> {
+    let mut enter = 0.0f64;
+    for axis in 0..3 {
+        let (low, high) = (-0.5, f64::from(cells.count()[axis]) - 0.5);
+        let (start, step) = (f64::from(from[axis]), f64::from(way[axis]));
+        let outside = if start < low {
+            low - start
+        } else {
+            high - start
+        };
+        if start < low || start > high {
+            if step == 0.0 {
+                return None;
+            }
+            enter = enter.max(outside / step);
+        }
+    }
+    (enter <= 1.0).then_some(enter.max(0.0))
+}
+
+/// Equation 5: the level of detail between the one that the view alone asks for and the lowest,
+/// `(1 - OP) * view + OP * lowest`. Any measure of detail that grows with it will do; cuts use one
+/// over the distance, with 0 for the lowest.
+pub fn blend(view: f32, lowest: f32, occlusion: f32) -> f32 {
+    (1.0 - occlusion) * view + occlusion * lowest
+}
+
+/// Another estimator, and what the grid hides besides.
+///
+/// Detail is one over the distance at which it is worth its cost, and the lowest is none, so
+/// equation 5 makes `1 / d` to `(1 - OP) / d`: a hidden sub-tree counts as `1 / (1 - OP)` times as far off.
+#[derive(Clone, Debug)]
+pub struct Hidden<'g, V> {
+    /// What is known without the grid.
+    pub inner: V,
+    /// Probabilities, cached for each cell.
+    pub occlusion: Occlusion<'g>,
+}
+
+impl<V: Visibility> Visibility for Hidden<'_, V> {
+    fn sight(&mut self, node: &Node, index: u32, eye: Vec3, place: &Place) -> Sight {
+        let sight = self.inner.sight(node, index, eye, place);
+        let hidden = self.occlusion.probability(place.to_world(node.center));
+        Sight {
+            visibility: blend(sight.visibility, 0.0, hidden),
+            ..sight
+        }
+    }
+
+    fn epoch(&mut self, eye: Vec3) -> u64 {
+        self.occlusion.look_from(eye);
+        let inner = self.inner.epoch(eye);
+        inner.wrapping_mul(0x1_0000_0001) ^ u64::from(self.occlusion.stamp())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A row of cells of edge 1 along x.
+    fn row(solidity: &[f32]) -> Cells {
+        let n = solidity.len() as u32;
+        let mut cells = Cells::new(Vec3::ZERO, Vec3::new(n as f32, 1.0, 1.0), [n, 1, 1]);
+        for (i, &s) in solidity.iter().enumerate() {
+            cells.set(IVec3::new(i as i32, 0, 0), s);
+        }
+        cells
+    }
+
+    fn seen(cells: &Cells, law: Law, from: f32) -> Vec<f32> {
+        let mut occlusion = Occlusion::new(cells, law);
+        occlusion.look_from(Vec3::new(from, 0.5, 0.5));
+        (0..cells.count().x)
+            .map(|i| occlusion.probability(cells.middle(IVec3::new(i, 0, 0))))
+            .collect()
+    }
+
+    #[test]
+    fn equation_4_by_hand() {
+        let cells = row(&[0.2, 0.5, 0.0, 0.3]);
+        let found = seen(&cells, Law::Equation4, 0.5);
+        // The eye's cell is left after half a unit, the others after one; diagonal sqrt(3).
+        let d = 3.0f32.sqrt();
+        let (t0, t1, t2) = (
+            0.8 * (-0.5 / d).exp(),
+            0.5 * (-1.0 / d).exp(),
+            (-1.0 / d).exp(),
+        );
+        let by_hand = [
+            0.2,
+            0.2 + t0 * 0.5,
+            0.2 + t0 * 0.5,
+            0.2 + t0 * 0.5 + t0 * t1 * t2 * 0.3,
+        ];
+        for (a, b) in found.iter().zip(by_hand) {
+            assert!((a - b).abs() < 1e-6, "{found:?} {by_hand:?}");
+        }
+    }
+
+    #[test]
+    fn beers_law_by_hand() {
+        let found = seen(&row(&[0.2, 0.5, 0.0, 0.3]), Law::Beer, 0.5);
+        let half = 1.0 - 0.8f32.sqrt();
+        let behind = 1.0 - 0.8f32.sqrt() * 0.5;
+        for (a, b) in found.iter().zip([0.0, half, behind, behind]) {
+            assert!((a - b).abs() < 1e-6, "{found:?}");
+        }
+    }
+
+    #[test]
+    fn a_solid_cell_hides_all_behind_it_and_air_hides_nothing() {
+        let wall = seen(&row(&[0.0, 0.0, 1.0, 0.0, 0.4, 0.0]), Law::Beer, 0.5);
+        assert_eq!(wall, [0.0, 0.0, 0.0, 1.0, 1.0, 1.0]);
+        for law in [Law::Beer, Law::Equation4] {
+            assert_eq!(seen(&row(&[0.0; 6]), law, 0.5), [0.0; 6]);
+            // A wall right in front of the eye hides by either law.
+            let near = seen(&row(&[1.0, 0.0, 0.3]), law, -0.5);
+            assert_eq!(near[1..], [1.0, 1.0], "{law:?}");
+        }
+    }
+
+    #[test]
+    fn probabilities_stay_in_bounds_and_never_fall_along_a_line() {
+        let mut state = 7u32;
+        let mut random = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 8) as f32 / (1 << 24) as f32
+        };
+        for _ in 0..50 {
+            let mut cells = Cells::new(Vec3::ZERO, Vec3::new(9.0, 7.0, 5.0), [9, 7, 5]);
+            for i in 0..9 * 7 * 5 {
+                let cell = IVec3::new(i % 9, i / 9 % 7, i / 63);
+                cells.set(
+                    cell,
+                    if random() < 0.1 {
+                        1.0
+                    } else {
+                        random() * random()
+                    },
+                );
+            }
+            let eye = Vec3::new(random(), random(), random()) * 30.0 - 10.0;
+            for law in [Law::Beer, Law::Equation4] {
+                let mut occlusion = Occlusion::new(&cells, law);
+                occlusion.look_from(eye);
+                let start = occlusion.eye_cell(eye);
+                for i in 0..9 * 7 * 5 {
+                    let p =
+                        occlusion.probability(cells.middle(IVec3::new(i % 9, i / 9 % 7, i / 63)));
+                    assert!((0.0..=1.0).contains(&p));
+                }
+                // Cells in one line with the eye's: multiples of one step.
+                let step = IVec3::new(1, (random() * 3.0) as i32 - 1, 1);
+                let mut before = 0.0;
+                for n in 0..40 {
+                    let cell = start + step * n;
+                    if cells.index(cell).is_some() {
+                        let p = walk(&cells, start, cell, law);
+                        assert!(p >= before - 1e-6, "{law:?}: {p} after {before}");
+                        before = p;
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn probabilities_are_computed_once_for_each_cell_of_the_eye() {
+        let cells = row(&[0.1; 8]);
+        let mut occlusion = Occlusion::new(&cells, Law::Beer);
+        assert!(occlusion.look_from(Vec3::splat(0.5)));
+        let first = occlusion.probability(Vec3::new(6.5, 0.5, 0.5));
+        assert_eq!(occlusion.probability(Vec3::new(6.9, 0.1, 0.5)), first);
+        assert_eq!(occlusion.computed(), 1);
+        assert!(!occlusion.look_from(Vec3::splat(0.7)));
+        occlusion.probability(Vec3::new(6.5, 0.5, 0.5));
+        assert_eq!(occlusion.computed(), 1);
+        assert!(occlusion.look_from(Vec3::new(1.5, 0.5, 0.5)));
+        assert!(occlusion.probability(Vec3::new(6.5, 0.5, 0.5)) < first);
+        assert_eq!(occlusion.computed(), 2);
+    }
+
+    #[test]
+    fn far_and_absent_eyes_have_a_defined_answer() {
+        let cells = row(&[0.3; 8]);
+        let near = seen(&cells, Law::Beer, -3.0);
+        let far = seen(&cells, Law::Beer, -3e12);
+        for (a, b) in near.iter().zip(&far) {
+            assert!((a - b).abs() < 1e-3, "{near:?} {far:?}");
+        }
+        let mut occlusion = Occlusion::new(&cells, Law::Beer);
+        for eye in [Vec3::INFINITY, Vec3::NAN] {
+            occlusion.look_from(eye);
+            assert!((0.0..=1.0).contains(&occlusion.probability(Vec3::ONE)));
+        }
+    }
+
+    #[test]
+    fn equation_5_blends_towards_the_lowest() {
+        assert_eq!(
+            (
+                blend(8.0, 2.0, 0.0),
+                blend(8.0, 2.0, 0.5),
+                blend(8.0, 2.0, 1.0)
+            ),
+            (8.0, 5.0, 2.0)
+        );
+    }
+}
