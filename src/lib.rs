@@ -42,6 +42,8 @@ pub mod runtime;
 pub mod scene;
 pub mod space;
 #[cfg(feature = "bake")]
+pub mod study;
+#[cfg(feature = "bake")]
 pub mod watch;
 
 #[cfg(feature = "bake")]

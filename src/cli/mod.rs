@@ -5,6 +5,7 @@ mod evaluate;
 mod grow;
 mod inspect;
 mod progress;
+mod study;
 
 use std::ffi::OsString;
 use std::process::ExitCode;
@@ -24,6 +25,7 @@ enum Command {
     Evaluate(evaluate::Args),
     Grow(grow::GrowArgs),
     Inspect(inspect::InspectArgs),
+    Study(study::StudyArgs),
 }
 
 /// Parses the arguments, runs one command and says how it ended.
@@ -40,6 +42,7 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         Command::Evaluate(args) => evaluate::run(&args),
         Command::Grow(args) => grow::run(&args),
         Command::Inspect(args) => inspect::run(&args),
+        Command::Study(args) => study::run(&args),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

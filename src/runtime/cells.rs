@@ -58,7 +58,8 @@ impl Cells {
     /// Sets a cell's solidity, clamped to 0..1; not a number counts as 0.
     pub fn set(&mut self, cell: IVec3, solidity: f32) {
         if let Some(index) = self.index(cell) {
-            self.solidity[index] = solidity.max(0.0).min(1.0);
+            let known = if solidity.is_nan() { 0.0 } else { solidity };
+            self.solidity[index] = known.clamp(0.0, 1.0);
         }
     }
 

@@ -70,7 +70,7 @@ impl Measuring {
 impl Measured {
     /// From bytes as [`Measured::bytes`] gives them; `None` where they don't fill whole items.
     pub fn from_bytes(side: u32, bytes: Vec<u8>) -> Option<Self> {
-        let whole = (1..=64).contains(&side) && bytes.len() % (side * side) as usize == 0;
+        let whole = (1..=64).contains(&side) && bytes.len().is_multiple_of((side * side) as usize);
         whole.then_some(Self { side, bytes })
     }
 
