@@ -77,7 +77,7 @@ fn places(count: usize, spacing: f32, species: u32) -> Vec<Place> {
         .map(|i| Place {
             position: Vec3::new((i % side) as f32, 0.0, (i / side) as f32) * spacing
                 + Vec3::new(random.next(), 0.0, random.next()) * spacing,
-            turn: Vec2::from_angle(random.next() * 6.28),
+            turn: Vec2::from_angle(random.next() * std::f32::consts::TAU),
             scale: 0.7 + 0.6 * random.next(),
             species: (random.next() * species as f32) as u32,
         })

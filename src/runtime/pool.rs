@@ -98,10 +98,10 @@ mod tests {
         for (tree, n) in [(0u32, 5u32), (1, 6), (0, 1), (2, 7), (1, 3), (0, 9)] {
             let dues = vec![tree as f32; n as usize];
             slots[tree as usize] = pool.replace(tree, slots[tree as usize], &list(n), &dues);
-            for other in 0..3 {
-                let range = Pool::range(slots[other]);
-                assert_eq!(pool.nodes[range.clone()], list(slots[other].len));
-                if slots[other].len > 1 {
+            for (other, &own) in slots.iter().enumerate() {
+                let range = Pool::range(own);
+                assert_eq!(pool.nodes[range.clone()], list(own.len));
+                if own.len > 1 {
                     assert!(pool.dues[range].iter().all(|d| *d == other as f32));
                 }
             }
