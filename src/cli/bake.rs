@@ -11,6 +11,7 @@ use crate::pipeline::{Baked, Limit, Request, Wanted, bake, to_json};
 use crate::recipe::{Preset, Recipe};
 use crate::report::schema::{Bake, Level, Report};
 use crate::scene::Scene;
+use crate::watch::Clock;
 
 /// Bake levels of detail of a tree.
 #[derive(clap::Args, Debug)]
@@ -60,7 +61,7 @@ pub fn run(args: Args) -> Result<()> {
     let started = Instant::now();
     let request = request(&args)?;
     catch_ctrl_c()?;
-    let bars = Bars::new(args.quiet);
+    let clock = Clock::new(Bars::new(args.quiet));
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(args.threads.into())
         .build()
@@ -68,11 +69,13 @@ pub fn run(args: Args) -> Result<()> {
             step: "start threads",
             what: e.to_string(),
         })?;
-    let baked = pool.install(|| bake(&request, &bars))?;
-    bars.finish();
+    let baked = pool.install(|| bake(&request, &clock))?;
+    clock.inner().finish();
+    let stages = clock.finish();
     let took = Bake {
         seconds: started.elapsed().as_secs_f64(),
-        peak_bytes: peak_bytes(),
+        peak_bytes: stages.iter().map(|s| s.peak_bytes).max().filter(|&b| b > 0),
+        stages,
     };
     for warning in baked.warnings.iter().filter(|_| !args.quiet) {
         eprintln!("warning: {warning}");
@@ -144,14 +147,6 @@ fn print(text: &str) -> Result<()> {
         )),
         _ => Ok(()),
     }
-}
-
-/// Peak resident memory, where Linux tells.
-fn peak_bytes() -> Option<u64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;
-    let kib: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
-    Some(kib * 1024)
 }
 
 /// One line a level.

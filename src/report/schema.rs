@@ -121,6 +121,22 @@ pub struct Bake {
     pub seconds: f64,
     /// Peak resident memory, bytes; null where the system does not tell.
     pub peak_bytes: Option<u64>,
+    /// Where the time went: stages and their parts, in the order in which each began first.
+    #[serde(default)]
+    pub stages: Vec<Stage>,
+}
+
+/// What one stage of a bake took.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Stage {
+    /// What was done.
+    pub name: String,
+    /// Wall-clock time, seconds.
+    pub seconds: f64,
+    /// Processor time of all threads, seconds; 0 where the system does not tell.
+    pub cpu_seconds: f64,
+    /// Largest resident memory of the process meanwhile, bytes; 0 where the system does not tell.
+    pub peak_bytes: u64,
 }
 
 impl Figure {

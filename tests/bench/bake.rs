@@ -6,8 +6,7 @@
 //! `PLEACH_BENCH_TREE=file.glb` takes another tree for the table.
 
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use pleach::botany::grow::{Options, Species, grow};
 use pleach::botany::load::load;
@@ -16,7 +15,7 @@ use pleach::export::surface::scene_of_model;
 use pleach::pipeline::{Baked, Limit, Request, Wanted, bake};
 use pleach::report::Drawable;
 use pleach::space::raster::{Camera, Mips, Sampling, draw};
-use pleach::watch::{Unwatched, Watch};
+use pleach::watch::{Clock, Unwatched, Watch};
 
 const TRIANGLES: u64 = 500_000;
 
@@ -51,73 +50,6 @@ fn four_levels(input: &Path, output: PathBuf, watch: &dyn Watch) -> Baked {
     bake(&request, watch).expect("a bake")
 }
 
-/// Time and memory of every stage and part, in order of their first appearance.
-struct Clock(Mutex<Times>);
-
-struct Row {
-    name: String,
-    time: Duration,
-    /// Largest memory of the process while it ran, bytes; 0 where the system doesn't say.
-    peak: u64,
-}
-
-/// The process's largest memory since the last call, bytes (Linux).
-fn peak_memory() -> u64 {
-    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"));
-    let kilobytes = line.and_then(|l| l.split_whitespace().next()?.parse::<u64>().ok());
-    let _ = std::fs::write("/proc/self/clear_refs", "5");
-    kilobytes.unwrap_or(0) * 1024
-}
-
-struct Times {
-    rows: Vec<Row>,
-    since: Instant,
-    current: usize,
-}
-
-impl Clock {
-    fn new() -> Self {
-        Self(Mutex::new(Times {
-            rows: vec![Row {
-                name: "start".into(),
-                time: Duration::ZERO,
-                peak: 0,
-            }],
-            since: Instant::now(),
-            current: 0,
-        }))
-    }
-
-    fn enter(&self, name: &str) {
-        let mut times = self.0.lock().expect("one thread begins stages");
-        let current = times.current;
-        let spent = times.since.elapsed();
-        times.rows[current].time += spent;
-        times.rows[current].peak = times.rows[current].peak.max(peak_memory());
-        times.since = Instant::now();
-        let known = times.rows.iter().position(|r| r.name == name);
-        times.current = known.unwrap_or(times.rows.len());
-        if known.is_none() {
-            times.rows.push(Row {
-                name: name.into(),
-                time: Duration::ZERO,
-                peak: 0,
-            });
-        }
-    }
-}
-
-impl Watch for Clock {
-    fn stage(&self, name: &str, _: u64) {
-        self.enter(name);
-    }
-
-    fn part(&self, name: &str) {
-        self.enter(&format!("  {name}"));
-    }
-}
-
 fn stages() {
     let folder = tempfile::tempdir().expect("a folder");
     let input = match std::env::var_os("PLEACH_BENCH_TREE") {
@@ -131,24 +63,23 @@ fn stages() {
             grown(folder.path(), (20_000 * TRIANGLES / few) as u32)
         }
     };
-    let clock = Clock::new();
+    let clock = Clock::new(Unwatched);
     let start = Instant::now();
     let output = folder.path().join("package");
     let baked = four_levels(&input, output.clone(), &clock);
     let all = start.elapsed().as_secs_f64();
-    clock.enter("end");
+    let rows = clock.finish();
     let limit = limit(&input, &output, &baked);
-    println!("\nstage            seconds  share  peak MB");
-    for row in &clock.0.lock().expect("the bake is over").rows {
-        let seconds = row.time.as_secs_f64();
-        if seconds > 0.0 {
-            println!(
-                "{:16} {seconds:7.2}  {:3.0} %  {:7.0}",
-                row.name,
-                100.0 * seconds / all,
-                row.peak as f64 / 1e6
-            );
-        }
+    println!("\nstage            seconds     cpu  share  peak MB");
+    for row in rows {
+        println!(
+            "{:16} {:7.2} {:7.2}  {:3.0} %  {:7.0}",
+            row.name,
+            row.seconds,
+            row.cpu_seconds,
+            100.0 * row.seconds / all,
+            row.peak_bytes as f64 / 1e6
+        );
     }
     println!("{:16} {all:7.2}", "bake");
     for (name, seconds) in &limit {

@@ -1,5 +1,9 @@
 //! Who watches a bake: told of every step, asked whether to go on.
 
+mod clock;
+
+pub use clock::Clock;
+
 use crate::error::{Error, Result};
 
 /// Follows a bake. All methods do nothing by default.
