@@ -167,6 +167,12 @@ impl Chart {
         !self.half || (x as f32 + 0.5) / w + (y as f32 + 0.5) / h < 1.0
     }
 
+    /// How many texels of each row belong to the chart; they are the first ones.
+    pub fn row_lengths(&self) -> Vec<u32> {
+        let length = |y| (0..self.size[0]).take_while(|&x| self.owns(x, y)).count() as u32;
+        (0..self.size[1]).map(length).collect()
+    }
+
     /// Where the local texel (x, y) lies in the atlas.
     pub fn in_atlas(&self, x: u32, y: u32) -> [u32; 2] {
         if self.turned {

@@ -12,7 +12,8 @@ use rayon::prelude::*;
 use super::foliage::Foliage;
 use super::surface::Surface;
 use crate::space::raster::{
-    Camera, Geometry, Material, Mips, Sampling, Scene, Texture, coverage, coverage_multisampled,
+    Camera, Geometry, Material, Mips, Sampling, Scene, Scores, Texture, coverage,
+    coverage_multisampled, critical,
 };
 use crate::space::root::Search;
 
@@ -64,22 +65,26 @@ const NEAR: Sampling = Sampling {
     mips: Mips::Base,
 };
 
-/// Near areas this close are the same.
-const NEAR_TOLERANCE: f64 = 1e-3;
+/// Thresholds beyond these leave no texel out, or none in.
+const THRESHOLDS: [f32; 2] = [-0.6, 1.6];
 
 /// Areas from afar this close are the same.
 const FAR_TOLERANCE: f64 = 4e-3;
+
+/// The contrast at which to begin: leaves on cards are sparse more often than dense.
+pub const CONTRAST_GUESS: i32 = 32;
 
 /// Both alphas stay this far from the cutoff of 128: room for rounding in mips.
 const HIGHEST_CONTRAST: f64 = 120.0;
 
 /// Sets the alpha of `foliage` from `score` so that cards and `wood` together cover what the
-/// original covers.
+/// original covers; the search begins at the contrast `guess`.
 pub fn match_area(
     foliage: &mut Foliage,
     score: &[f32],
     wood: &[Surface],
     goal: &AreaGoal,
+    guess: i32,
 ) -> Matched {
     let mut found = Matched {
         threshold: 0.5,
@@ -89,36 +94,63 @@ pub fn match_area(
         return found;
     }
     let mut level = LevelScene::new(foliage, wood);
+    let owned_score: Vec<f32> = score
+        .iter()
+        .zip(&foliage.owned)
+        .map(|(&score, &owned)| if owned { score } else { f32::NEG_INFINITY })
+        .collect();
     let search = Search {
         range: [-HIGHEST_CONTRAST, HIGHEST_CONTRAST],
-        guess: 32.0,
+        guess: guess.into(),
         step: 16.0,
         grain: 2.0,
         tolerance: FAR_TOLERANCE,
     };
     search.falling(|contrast| {
         found.contrast = contrast.round() as i32;
-        found.threshold = level.threshold(foliage, score, found, goal);
-        apply(foliage, score, found);
+        (found.threshold, found.near_ratio) = level.threshold(&owned_score, found.alphas(), goal);
+        apply(foliage, &owned_score, found);
         found.own_ratio = level.client_area(foliage, &goal.own) / goal.own_area.max(1e-9);
         found.far_ratio = level.client_area(foliage, &goal.far) / goal.far_area.max(1e-9);
         1.0 - (found.own_ratio + found.far_ratio) / 2.0
     });
-    found.near_ratio = level.near_area(foliage, &goal.near) / goal.near_area.max(1e-9);
     found
 }
 
 fn apply(foliage: &mut Foliage, score: &[f32], found: Matched) {
     let [opaque, other] = found.alphas();
-    let texels = score.iter().zip(&foliage.owned);
-    for (alpha, (&score, &owned)) in foliage.alpha.iter_mut().zip(texels) {
-        // Texels of no chart stay empty: they would only bleed into the mips of their neighbours.
-        *alpha = match owned {
-            false => 0,
-            true if score >= found.threshold => opaque,
-            true => other,
+    for (alpha, &score) in foliage.alpha.iter_mut().zip(score) {
+        *alpha = if score >= found.threshold {
+            opaque
+        } else if score > f32::NEG_INFINITY {
+            other
+        } else {
+            // Texels of no chart stay empty: they would only bleed into their neighbours' mips.
+            0
         };
     }
+}
+
+/// The threshold at which as many pixels are covered as `wanted`, and how many are.
+fn at_count(mut critical: Vec<f32>, wanted: f64) -> (f32, usize) {
+    let [least, most] = THRESHOLDS;
+    critical.sort_unstable_by(|a, b| b.total_cmp(a));
+    let covered = |threshold: f32| critical.partition_point(|&c| c >= threshold);
+    let index = (wanted.round() as usize).min(critical.len());
+    let Some(&last) = critical.get(index.saturating_sub(1)) else {
+        return (least, 0);
+    };
+    // Many texels may have the same score: with them or without, whichever is nearer.
+    let tied = last.clamp(least, most);
+    let next = critical[..covered(tied)].iter().rev().find(|&&c| c > tied);
+    let above = next.map_or(most, |c| 0.5 * (tied + c)).clamp(least, most);
+    let miss = |threshold: f32| (covered(threshold) as f64 - wanted).abs();
+    let best = if miss(above) < miss(tied) {
+        above
+    } else {
+        tied
+    };
+    (best, covered(best))
 }
 
 /// Cards and wood in one mesh for the raster; only alpha changes between renderings.
@@ -150,26 +182,14 @@ impl LevelScene {
         }
     }
 
-    /// The threshold at which the near area is the original's.
-    fn threshold(
-        &mut self,
-        foliage: &mut Foliage,
-        score: &[f32],
-        mut found: Matched,
-        goal: &AreaGoal,
-    ) -> f32 {
-        let search = Search {
-            range: [-0.6, 1.6],
-            guess: f64::from(found.threshold),
-            step: 0.05,
-            grain: 0.002,
-            tolerance: NEAR_TOLERANCE * goal.near_area,
-        };
-        search.falling(|threshold| {
-            found.threshold = threshold as f32;
-            apply(foliage, score, found);
-            self.near_area(foliage, &goal.near) - goal.near_area
-        }) as f32
+    /// The threshold at which the near area is the original's, and the area over it.
+    fn threshold(&self, score: &[f32], alphas: [u8; 2], goal: &AreaGoal) -> (f32, f64) {
+        let materials = materials();
+        let scene = self.scene(&materials);
+        let draw = |camera: &Camera| critical(&scene, camera, Scores { score, alphas });
+        let pixels: Vec<Vec<f32>> = goal.near.par_iter().map(draw).collect();
+        let (threshold, covered) = at_count(pixels.concat(), goal.near_area);
+        (threshold, covered as f64 / goal.near_area.max(1e-9))
     }
 
     /// Covered pixels of each camera, from the base level.
@@ -177,10 +197,6 @@ impl LevelScene {
         self.areas(foliage, cameras, |scene, camera| {
             coverage(scene, camera, NEAR).area()
         })
-    }
-
-    fn near_area(&mut self, foliage: &Foliage, cameras: &[Camera]) -> f64 {
-        self.near_areas(foliage, cameras).iter().sum()
     }
 
     /// Covered pixels of all cameras as a client draws them.
@@ -198,18 +214,16 @@ impl LevelScene {
         draw: impl Fn(&Scene, &Camera) -> f64 + Sync,
     ) -> Vec<f64> {
         self.textures[0].set_alpha(&foliage.alpha);
-        let cards = Material {
-            texture: Some(0),
-            cutoff: Some(0.5),
-            double_sided: true,
-            ..Material::default()
-        };
-        // As it is written: thin twigs are ribbons of one sheet that both sides show.
-        let bark = Material {
-            double_sided: true,
-            ..Material::default()
-        };
-        let scene = Scene {
+        let materials = materials();
+        let scene = self.scene(&materials);
+        cameras
+            .par_iter()
+            .map(|camera| draw(&scene, camera))
+            .collect()
+    }
+
+    fn scene<'a>(&'a self, materials: &'a [Material]) -> Scene<'a> {
+        Scene {
             geometry: Geometry {
                 positions: &self.surface.positions,
                 normals: &[],
@@ -218,14 +232,25 @@ impl LevelScene {
                 triangles: &self.surface.triangles,
                 triangle_material: &self.materials,
             },
-            materials: &[cards, bark],
+            materials,
             textures: &self.textures,
-        };
-        cameras
-            .par_iter()
-            .map(|camera| draw(&scene, camera))
-            .collect()
+        }
     }
+}
+
+/// Those of cards and of wood. Both have two sides, as they are written: thin twigs are ribbons of
+/// one sheet.
+fn materials() -> [Material; 2] {
+    let wood = Material {
+        double_sided: true,
+        ..Material::default()
+    };
+    let cards = Material {
+        texture: Some(0),
+        cutoff: Some(0.5),
+        ..wood
+    };
+    [cards, wood]
 }
 
 #[cfg(test)]
@@ -280,7 +305,7 @@ mod tests {
             far,
             far_area,
         };
-        match_area(&mut foliage, &score, &[], &goal)
+        match_area(&mut foliage, &score, &[], &goal, CONTRAST_GUESS)
     }
 
     /// 0 to 9, alike over 3 x 3 texels.
@@ -303,6 +328,18 @@ mod tests {
         let found = matched(|x, y| clump(x, y) < 7);
         assert!(found.contrast < 0, "{found:?}");
         assert!((found.near_ratio - 1.0).abs() < 0.05, "{found:?}");
+    }
+
+    #[test]
+    fn the_threshold_leaves_as_many_pixels_as_wanted() {
+        let critical = vec![0.5, f32::INFINITY, 0.75, 0.25, 0.5, 0.5];
+        assert_eq!(at_count(critical.clone(), 2.0), (0.75, 2));
+        // Three are tied: five are nearer to four than two are.
+        assert_eq!(at_count(critical.clone(), 4.0), (0.5, 5));
+        assert_eq!(at_count(critical.clone(), 3.0), (0.625, 2));
+        assert_eq!(at_count(critical.clone(), 9.0), (0.25, 6));
+        assert_eq!(at_count(critical.clone(), 0.0), (THRESHOLDS[1], 1));
+        assert_eq!(at_count(Vec::new(), 9.0), (THRESHOLDS[0], 0));
     }
 
     #[test]

@@ -6,7 +6,7 @@
 use glam::{Vec2, Vec3};
 
 use super::chart::Chart;
-use crate::botany::model::{Material, Model};
+use crate::botany::model::{Image, Model, TextureRef, Wrap};
 use crate::space::texture::{cutoff, linear, nearest};
 
 /// What one texel of a card shows.
@@ -74,54 +74,114 @@ fn draw(model: &Model, t: u32, chart: &Chart, samples: f32, [sw, sh]: [u32; 2], 
     let corners = model.corners(t);
     let p = corners.map(|c| chart.texel(c) * samples);
     let depth = corners.map(|c| (c - chart.origin).dot(chart.normal));
-    let double_area = (p[1] - p[0]).perp_dot(p[2] - p[0]);
+    let (side, other) = (p[1] - p[0], p[2] - p[0]);
+    let double_area = side.perp_dot(other);
     if double_area.abs() < 1e-12 {
         return;
     }
-    let material = model.material_of(t);
-    let cutoff = cutoff(material);
+    let alpha = Alpha::of(model, t);
+    // Barycentric weights of corners 1 and 2: what they gain from a sample to the next.
+    let right = Vec2::new(other.y, -side.y) / double_area;
+    let down = Vec2::new(-other.x, side.x) / double_area;
     let low = p[0].min(p[1]).min(p[2]).max(Vec2::ZERO);
     let high = p[0].max(p[1]).max(p[2]);
     let x_end = (high.x.ceil().max(0.0) as u32).min(sw);
     let y_end = (high.y.ceil().max(0.0) as u32).min(sh);
     for y in low.y as u32..y_end {
-        for x in low.x as u32..x_end {
-            let q = Vec2::new(x as f32 + 0.5, y as f32 + 0.5) - p[0];
-            let b = q.perp_dot(p[2] - p[0]) / double_area;
-            let c = (p[1] - p[0]).perp_dot(q) / double_area;
-            if b < 0.0 || c < 0.0 || b + c > 1.0 {
+        let first = Vec2::new(0.5 - p[0].x, y as f32 + 0.5 - p[0].y);
+        let row = right * first.x + down * first.y;
+        let [from, to] = inside(row, right, [low.x as u32, x_end]);
+        for x in from..to {
+            let weights = row + right * x as f32;
+            if weights.min_element() < 0.0 || weights.element_sum() > 1.0 {
                 continue;
             }
-            let d = depth[0] + b * (depth[1] - depth[0]) + c * (depth[2] - depth[0]);
+            let d = depth[0] + weights.dot(Vec2::new(depth[1] - depth[0], depth[2] - depth[0]));
             let hit = &mut hits[(y * sw + x) as usize];
-            if d > hit.depth && alpha(model, material, t, b, c) >= cutoff {
+            if d > hit.depth && alpha.passes(weights) {
                 *hit = Hit {
                     depth: d,
                     triangle: t,
-                    weights: Vec2::new(b, c),
+                    weights,
                 };
             }
         }
     }
 }
 
+/// The samples of a row that may be inside a triangle, one more on each side than there are: where
+/// both weights and what they leave for corner 0 are not negative.
+fn inside(row: Vec2, right: Vec2, [from, to]: [u32; 2]) -> [u32; 2] {
+    let (mut low, mut high) = (from as f32, to as f32);
+    let third = (1.0 - row.element_sum(), -right.element_sum());
+    for (value, slope) in [(row.x, right.x), (row.y, right.y), third] {
+        let crossing = -value / slope;
+        if slope > 0.0 {
+            low = low.max(crossing - 1.0);
+        } else if slope < 0.0 {
+            high = high.min(crossing + 2.0);
+        } else if value < 0.0 {
+            return [0, 0];
+        }
+    }
+    // Not a number where a sliver divides by almost nothing: then all are tried.
+    let first = if low > from as f32 { low as u32 } else { from };
+    let last = if high < to as f32 {
+        high.max(0.0) as u32
+    } else {
+        to
+    };
+    [first.min(to), last.min(to)]
+}
+
+/// The alpha test of a triangle.
+struct Alpha<'a> {
+    /// `None`: everything passes or nothing does, by `least`.
+    image: Option<(&'a Image, [Wrap; 2])>,
+    uv: Vec2,
+    /// Change of the texture coordinate with the weights of corners 1 and 2.
+    along: [Vec2; 2],
+    /// Least alpha of a texel that passes, 0 to 255.
+    least: f32,
+}
+
+impl<'a> Alpha<'a> {
+    fn of(model: &'a Model, t: u32) -> Self {
+        let material = model.material_of(t);
+        let factor = material.base_color_factor[3];
+        // Compared as `alpha / 255 * factor >= cutoff`.
+        let least = match cutoff(material) {
+            cutoff if cutoff <= 0.0 => f32::MIN,
+            cutoff => cutoff * 255.0 / factor.max(1e-9),
+        };
+        let texture = material.base_color.filter(|_| least > 0.0);
+        let [a, b, c] = match texture {
+            Some(texture) => {
+                let uvs = &model.uvs[usize::from(texture.uv_set)];
+                model.triangles[t as usize].map(|i| uvs[i as usize])
+            }
+            None => [Vec2::ZERO; 3],
+        };
+        Self {
+            image: texture.map(|t| (&model.images[t.image as usize], t.wrap)),
+            uv: a,
+            along: [b - a, c - a],
+            least,
+        }
+    }
+
+    fn passes(&self, weights: Vec2) -> bool {
+        let alpha = self.image.map_or(255, |(image, wrap)| {
+            let uv = self.uv + self.along[0] * weights.x + self.along[1] * weights.y;
+            nearest(image, wrap, uv)[3]
+        });
+        f32::from(alpha) >= self.least
+    }
+}
+
 fn mix2(values: &[Vec2], corners: [u32; 3], b: f32, c: f32) -> Vec2 {
     let [v0, v1, v2] = corners.map(|i| values[i as usize]);
     v0 + (v1 - v0) * b + (v2 - v0) * c
-}
-
-fn alpha(model: &Model, material: &Material, t: u32, b: f32, c: f32) -> f32 {
-    let Some(texture) = material.base_color else {
-        return 1.0;
-    };
-    let uv = mix2(
-        &model.uvs[texture.uv_set as usize],
-        model.triangles[t as usize],
-        b,
-        c,
-    );
-    let texel = nearest(&model.images[texture.image as usize], texture.wrap, uv);
-    f32::from(texel[3]) / 255.0 * material.base_color_factor[3]
 }
 
 fn resolve<'a>(
@@ -132,13 +192,22 @@ fn resolve<'a>(
 ) -> Texel {
     let mut sum = Texel::default();
     let mut covered = 0u32;
+    // Neighbouring samples of one triangle: its colour varies, its normal hardly does.
+    let mut run: Option<Run> = None;
     for hit in hits.filter(|h| h.triangle != u32::MAX) {
-        let seen = shade(model, chart, hit);
-        sum.color += seen.color;
-        sum.normal += seen.normal;
-        sum.orm += seen.orm;
+        sum.color += color(model, hit);
         covered += 1;
+        match &mut run {
+            Some(run) if run.triangle == hit.triangle => run.add(hit),
+            _ => {
+                let done = run.replace(Run::of(hit));
+                done.into_iter()
+                    .for_each(|r| r.shade(model, chart, &mut sum));
+            }
+        }
     }
+    run.into_iter()
+        .for_each(|r| r.shade(model, chart, &mut sum));
     if covered == 0 {
         return sum;
     }
@@ -151,41 +220,74 @@ fn resolve<'a>(
     }
 }
 
-fn shade(model: &Model, chart: &Chart, hit: &Hit) -> Texel {
+/// Samples of one triangle within a texel.
+struct Run {
+    triangle: u32,
+    /// Sum of their weights.
+    weights: Vec2,
+    count: f32,
+}
+
+impl Run {
+    fn of(hit: &Hit) -> Self {
+        Self {
+            triangle: hit.triangle,
+            weights: hit.weights,
+            count: 1.0,
+        }
+    }
+
+    fn add(&mut self, hit: &Hit) {
+        self.weights += hit.weights;
+        self.count += 1.0;
+    }
+
+    /// Adds normal, occlusion, roughness and metalness in their middle, once for each sample.
+    fn shade(&self, model: &Model, chart: &Chart, sum: &mut Texel) {
+        let weights = self.weights / self.count;
+        sum.normal += card_normal(model, chart, self.triangle, weights.x, weights.y) * self.count;
+        sum.orm += orm(model, self.triangle, weights) * self.count;
+    }
+}
+
+fn sample(model: &Model, texture: TextureRef, t: u32, weights: Vec2) -> [u8; 4] {
+    let uvs = &model.uvs[usize::from(texture.uv_set)];
+    let uv = mix2(uvs, model.triangles[t as usize], weights.x, weights.y);
+    nearest(&model.images[texture.image as usize], texture.wrap, uv)
+}
+
+/// Linear base colour at a sample.
+fn color(model: &Model, hit: &Hit) -> Vec3 {
     let t = hit.triangle;
-    let corners = model.triangles[t as usize];
-    let (b, c) = (hit.weights.x, hit.weights.y);
     let material = model.material_of(t);
-    let sample = |texture: crate::botany::model::TextureRef| {
-        let uv = mix2(&model.uvs[texture.uv_set as usize], corners, b, c);
-        nearest(&model.images[texture.image as usize], texture.wrap, uv)
-    };
     let factor = material.base_color_factor;
     let mut color = Vec3::new(factor[0], factor[1], factor[2]);
     if let Some(texture) = material.base_color {
-        let texel = sample(texture);
+        let texel = sample(model, texture, t, hit.weights);
         color *= Vec3::new(linear(texel[0]), linear(texel[1]), linear(texel[2]));
     }
     if !model.colors.is_empty() {
-        let [c0, c1, c2] = corners.map(|i| Vec3::from_slice(&model.colors[i as usize][..3]));
-        color *= c0 + (c1 - c0) * b + (c2 - c0) * c;
+        let corner = |i: u32| Vec3::from_slice(&model.colors[i as usize][..3]);
+        let [c0, c1, c2] = model.triangles[t as usize].map(corner);
+        color *= c0 + (c1 - c0) * hit.weights.x + (c2 - c0) * hit.weights.y;
     }
+    color
+}
+
+/// Occlusion, roughness and metalness.
+fn orm(model: &Model, t: u32, weights: Vec2) -> Vec3 {
+    let material = model.material_of(t);
     let mut orm = Vec3::new(1.0, material.roughness_factor, material.metallic_factor);
     if let Some(texture) = material.metallic_roughness {
-        let texel = sample(texture);
+        let texel = sample(model, texture, t, weights);
         orm.y *= f32::from(texel[1]) / 255.0;
         orm.z *= f32::from(texel[2]) / 255.0;
     }
     if let Some(texture) = material.occlusion {
-        let red = f32::from(sample(texture)[0]) / 255.0;
+        let red = f32::from(sample(model, texture, t, weights)[0]) / 255.0;
         orm.x = 1.0 + material.occlusion_strength * (red - 1.0);
     }
-    Texel {
-        coverage: 1.0,
-        color,
-        normal: card_normal(model, chart, t, b, c),
-        orm,
-    }
+    orm
 }
 
 /// The shading normal in the card's frame, turned to the side from which the card is seen.

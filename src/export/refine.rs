@@ -48,6 +48,7 @@ pub struct Refine {
 pub fn refine(foliage: &Foliage, targets: &[Target], options: Refine) -> Vec<f32> {
     let mut score: Vec<f32> = foliage.texels.iter().map(Stored::coverage).collect();
     let mut mean = vec![0.0f32; score.len()];
+    let rows: Vec<Vec<u32>> = foliage.charts.iter().map(Chart::row_lengths).collect();
     for round in 0..options.rounds {
         let on: Vec<bool> = score.iter().map(|&s| s >= 0.5).collect();
         // Views take turns, a third of them a round where there are rounds for all: a third of the
@@ -57,12 +58,26 @@ pub fn refine(foliage: &Foliage, targets: &[Target], options: Refine) -> Vec<f32
         let asked: Vec<&Target> = targets.iter().skip(turn).step_by(turns).collect();
         let counts: Vec<Vec<u8>> = asked
             .par_iter()
-            .map(|target| count(foliage, target, &on))
+            .map(|target| count(foliage, &rows, target, &on))
+            .collect();
+        let opinions: Vec<Vec<[f32; 2]>> = asked
+            .par_iter()
+            .zip(counts)
+            .map(|(target, counts)| opinions(target, &counts))
             .collect();
         let votes: Vec<Vec<f32>> = foliage
             .charts
             .par_iter()
-            .map(|chart| vote(chart, foliage.size[0], &asked, &counts, &on))
+            .zip(&rows)
+            .map(|(chart, rows)| {
+                vote(
+                    (chart, rows.as_slice()),
+                    foliage.size[0],
+                    &asked,
+                    &opinions,
+                    &on,
+                )
+            })
             .collect();
         // Later rounds move less, so that two cards do not swap a cell for ever.
         let step = 1.0 / (round as f32 + 1.0).sqrt();
@@ -112,10 +127,10 @@ fn follow_neighbours(score: &mut [f32], foliage: &Foliage) {
 }
 
 /// How many opaque texels each cell sees, at most 255.
-fn count(foliage: &Foliage, target: &Target, on: &[bool]) -> Vec<u8> {
+fn count(foliage: &Foliage, rows: &[Vec<u32>], target: &Target, on: &[bool]) -> Vec<u8> {
     let mut counts = vec![0u8; target.wanted.len()];
-    for chart in &foliage.charts {
-        scan(chart, target, |cell, x, y| {
+    for (chart, rows) in foliage.charts.iter().zip(rows) {
+        scan(chart, rows, target, |cell, x, y| {
             let [ax, ay] = chart.in_atlas(x, y);
             if on[(ay * foliage.size[0] + ax) as usize] {
                 counts[cell] = counts[cell].saturating_add(1);
@@ -125,38 +140,53 @@ fn count(foliage: &Foliage, target: &Target, on: &[bool]) -> Vec<u8> {
     counts
 }
 
+/// For every cell what it says to a texel that is transparent, and to one that is opaque there:
+/// pairs, since the latter is one of those that were counted.
+fn opinions(target: &Target, counts: &[u8]) -> Vec<[f32; 2]> {
+    let opinion = |wanted: bool, others: u8| match wanted {
+        true => f32::from(u8::from(others == 0)),
+        false => -1.0 / (f32::from(others) + 1.0),
+    };
+    let cells = target.wanted.iter().zip(&target.taken).zip(counts);
+    cells
+        .map(|((&wanted, &taken), &count)| match taken {
+            true => [0.0; 2],
+            false => [count, count.saturating_sub(1)].map(|others| opinion(wanted, others)),
+        })
+        .collect()
+}
+
 fn vote(
-    chart: &Chart,
+    (chart, rows): (&Chart, &[u32]),
     width: u32,
     targets: &[&Target],
-    counts: &[Vec<u8>],
+    opinions: &[Vec<[f32; 2]>],
     on: &[bool],
 ) -> Vec<f32> {
     let texels = (chart.size[0] * chart.size[1]) as usize;
-    let (mut sum, mut hits) = (vec![0.0f32; texels], vec![0u32; texels]);
-    for (target, counts) in targets.iter().zip(counts) {
-        scan(chart, target, |cell, x, y| {
+    let mut sums = vec![(0.0f32, 0u32); texels];
+    let mut own = vec![false; texels];
+    for y in 0..chart.size[1] {
+        for x in 0..chart.size[0] {
             let [ax, ay] = chart.in_atlas(x, y);
-            let own = u8::from(on[(ay * width + ax) as usize]);
-            let others = counts[cell].saturating_sub(own);
+            own[(y * chart.size[0] + x) as usize] = on[(ay * width + ax) as usize];
+        }
+    }
+    for (target, opinions) in targets.iter().zip(opinions) {
+        scan(chart, rows, target, |cell, x, y| {
             let at = (y * chart.size[0] + x) as usize;
-            hits[at] += 1;
-            sum[at] += match (target.wanted[cell], target.taken[cell]) {
-                (_, true) => 0.0,
-                (true, false) if others == 0 => 1.0,
-                (true, false) => 0.0,
-                (false, false) => -1.0 / (f32::from(others) + 1.0),
-            };
+            let (sum, hits) = &mut sums[at];
+            *sum += opinions[cell][usize::from(own[at])];
+            *hits += 1;
         });
     }
-    for (sum, &hits) in sum.iter_mut().zip(&hits) {
-        *sum /= hits.max(1) as f32;
-    }
-    sum
+    let mean = |&(sum, hits): &(f32, u32)| sum / hits.max(1) as f32;
+    sums.iter().map(mean).collect()
 }
 
-/// Visits every cell whose centre the card covers, with the texel that lies there.
-fn scan(chart: &Chart, target: &Target, mut visit: impl FnMut(usize, u32, u32)) {
+/// Visits every cell whose centre the card covers, with the texel that lies there; `rows` are the
+/// chart's [`Chart::row_lengths`].
+fn scan(chart: &Chart, rows: &[u32], target: &Target, mut visit: impl FnMut(usize, u32, u32)) {
     let cell = |p: Vec3| target.base + Vec2::new(p.dot(target.right), p.dot(target.down));
     let corner: Vec<Vec2> = chart.corners.iter().map(|&p| cell(p)).collect();
     let texel: Vec<Vec2> = chart.corners[..3].iter().map(|&p| chart.texel(p)).collect();
@@ -190,7 +220,7 @@ fn scan(chart: &Chart, target: &Target, mut visit: impl FnMut(usize, u32, u32)) 
             + per_y * (middle - corner[0].y);
         for x in x_first..x_last {
             let (tx, ty) = (at.x.max(0.0) as u32, at.y.max(0.0) as u32);
-            if tx < chart.size[0] && ty < chart.size[1] && chart.owns(tx, ty) {
+            if rows.get(ty as usize).is_some_and(|&length| tx < length) {
                 visit((y * target.size[0] + x) as usize, tx, ty);
             }
             at += per_x;

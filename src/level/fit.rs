@@ -6,7 +6,7 @@ use super::{Baker, Level, LevelRequest, WHOLE_TREE_TRIANGLES};
 use crate::detail::level::LevelPlan;
 use crate::error::Result;
 use crate::export::foliage::{BakeOptions, Foliage};
-use crate::export::matching::{AreaGoal, LevelScene, Matched, match_area};
+use crate::export::matching::{AreaGoal, CONTRAST_GUESS, LevelScene, Matched, match_area};
 use crate::export::mip::shrink;
 use crate::export::original::{Original, camera};
 use crate::export::refine::{Refine, refine};
@@ -69,6 +69,7 @@ impl Baker<'_> {
         // trees): then the tubes become thinner, and the cards are fitted again.
         let mut radius_scale = 1.0f32;
         let mut tries = 0;
+        let mut guess = CONTRAST_GUESS;
         loop {
             part(watch, "wood")?;
             let wood = self.wood(&plan, request.height_px, radius_scale);
@@ -81,8 +82,9 @@ impl Baker<'_> {
             };
             let score = refine(&foliage, &targets, options);
             part(watch, "match area")?;
-            let matched = match_area(&mut foliage, &score, &wood.surfaces, &goal);
+            let matched = match_area(&mut foliage, &score, &wood.surfaces, &goal, guess);
             tries += 1;
+            guess = matched.contrast;
             let over = matched.near_ratio;
             if tries == WOOD_TRIES || plan.tubes.is_empty() || over <= 1.0 + WOOD_TOLERANCE {
                 return Ok(Fitted {

@@ -142,7 +142,7 @@ fn distance_m(original: &Model, height_px: u32) -> f64 {
     height_m * SCREEN_LINES / (2.0 * height_px as f64 * half_angle.tan())
 }
 
-/// Fragments a covered sample, mean over views; hardly depends on the size on the screen.
+/// Fragments a covered sample, mean over every third view; hardly depends on view or size.
 fn overdraw(level: &Drawable, original: &Model, views: &[View]) -> f64 {
     let place = level.placement_in(original.frame);
     let in_view = |view: &View| {
@@ -150,6 +150,7 @@ fn overdraw(level: &Drawable, original: &Model, views: &[View]) -> f64 {
         let (_, stats) = coverage_with_stats(&level.scene(), &camera, Sampling::CLIENT);
         stats.fragments as f64 / stats.covered.max(1) as f64
     };
-    let each: Vec<f64> = views.par_iter().map(in_view).collect();
+    let some: Vec<&View> = views.iter().step_by(3).collect();
+    let each: Vec<f64> = some.into_par_iter().map(in_view).collect();
     each.iter().sum::<f64>() / each.len().max(1) as f64
 }

@@ -55,8 +55,9 @@ pub fn judge(
         .map(|l| Drawable::silhouette(&l.model))
         .collect();
     let views = settings.view_set();
-    for height_px in heights(levels) {
-        let reference = Reference::of(&own, original.0, &views, height_px);
+    let heights_px = heights(levels);
+    for reference in Reference::each(&own, original.0, &views, &heights_px) {
+        let height_px = reference.height_px();
         if let Some(row) = &mut report.original {
             row.sizes.push(reference.compare_client(&own));
         }

@@ -8,11 +8,12 @@ use super::silhouette::{Agreement, agreement, ratio};
 use crate::botany::Model;
 use crate::botany::model::Frame;
 use crate::space::raster::{
-    Camera, Coverage, Placement, Sampling, Scene, coverage, coverage_multisampled,
+    Camera, Coverage, Mask, Placement, Sampling, Scene, coverage, coverage_multisampled,
 };
 use crate::space::view::View;
 
-/// An original at one size on the screen, drawn once from every view with 4 x 4 samples a pixel.
+/// An original at one size on the screen, drawn once from every view with at least 4 x 4 samples a
+/// pixel.
 #[derive(Debug)]
 pub struct Reference {
     height_px: u32,
@@ -29,8 +30,8 @@ struct Picture {
     original: Coverage,
 }
 
-/// Half a pixel in samples of [`Sampling::REFERENCE`].
-const HALF_PIXEL: i32 = Sampling::REFERENCE.side as i32 / 2;
+/// Pictures are drawn for sizes down to this many halvings.
+const MOST_HALVINGS: u32 = 5;
 
 /// The least error by which shift ratios divide: a tree too coarse to notice half a pixel.
 const LEAST_SHIFT_ERROR: f64 = 1e-4;
@@ -43,32 +44,75 @@ impl Reference {
 
     /// As [`Reference::new`], for a model that is ready to be drawn (at several sizes).
     pub fn of(drawable: &Drawable, original: &Model, views: &[View], height_px: u32) -> Self {
+        Self::halved(drawable, original, views, height_px, &[0]).remove(0)
+    }
+
+    /// One reference for each of `heights_px` (largest first), in that order. Sizes that are halves
+    /// of each other are drawn once, at the largest: the samples of four of its pixels are more
+    /// samples for one of the next size.
+    pub fn each(
+        drawable: &Drawable,
+        original: &Model,
+        views: &[View],
+        heights_px: &[u32],
+    ) -> Vec<Self> {
+        let mut out: Vec<Self> = Vec::new();
+        for &height_px in heights_px {
+            if out.iter().any(|r| r.height_px == height_px) {
+                continue;
+            }
+            let halvings = |&px: &u32| {
+                let times = (height_px / px.max(1)).checked_ilog2()?;
+                (px << times == height_px && times <= MOST_HALVINGS).then_some(times)
+            };
+            let times: Vec<u32> = heights_px.iter().filter_map(halvings).collect();
+            out.extend(Self::halved(drawable, original, views, height_px, &times));
+        }
+        out.sort_by_key(|r| heights_px.iter().position(|&px| px == r.height_px));
+        out
+    }
+
+    /// References at `height_px` halved so many `times`.
+    fn halved(
+        drawable: &Drawable,
+        original: &Model,
+        views: &[View],
+        height_px: u32,
+        times: &[u32],
+    ) -> Vec<Self> {
         let height = original.height();
         let scene = drawable.scene();
-        let drawn: Vec<(Picture, f64)> = views
+        let most = times.iter().max().map_or(0, |&t| t);
+        let drawn: Vec<Vec<(Picture, f64)>> = views
             .par_iter()
             .map(|view| {
-                let camera = view.camera(height, height_px);
-                let mask = coverage(&scene, &camera, Sampling::REFERENCE);
-                let original = mask.coverage();
-                // Half a pixel is two samples: the moved picture needs no second drawing.
-                let moved = [(HALF_PIXEL, 0), (0, HALF_PIXEL)]
-                    .map(|(x, y)| agreement(&original, &mask.coverage_shifted(x, y)).f1());
-                let picture = Picture {
-                    view: view.clone(),
-                    camera,
-                    original,
+                let camera = view.camera_in_steps(height, height_px, 1 << most);
+                let mut mask = coverage(&scene, &camera, Sampling::REFERENCE);
+                let size = [mask.width, mask.height];
+                let mut at = |&times: &u32| {
+                    [mask.width, mask.height] = size.map(|s| s >> times);
+                    mask.side = Sampling::REFERENCE.side << times;
+                    Picture::of(view, camera, &mask, times)
                 };
-                (picture, 0.5 * (moved[0] + moved[1]))
+                times.iter().map(&mut at).collect()
             })
             .collect();
-        let shifted_f1 = drawn.iter().map(|d| d.1).sum::<f64>() / drawn.len().max(1) as f64;
-        Self {
-            height_px,
-            frame: original.frame,
-            pictures: drawn.into_iter().map(|d| d.0).collect(),
-            shifted_f1,
+        let mut out: Vec<Self> = times
+            .iter()
+            .map(|&times| Self {
+                height_px: height_px >> times,
+                frame: original.frame,
+                pictures: Vec::with_capacity(views.len()),
+                shifted_f1: 0.0,
+            })
+            .collect();
+        for pictures in drawn {
+            for (reference, (picture, f1)) in out.iter_mut().zip(pictures) {
+                reference.pictures.push(picture);
+                reference.shifted_f1 += f1 / views.len() as f64;
+            }
         }
+        out
     }
 
     /// Height of the tree in pixels.
@@ -140,6 +184,28 @@ impl Reference {
 }
 
 impl Picture {
+    /// The picture that `mask` shows, at `camera` halved so many `times`, and the F1 of the mask
+    /// moved by half a pixel.
+    fn of(view: &View, camera: Camera, mask: &Mask, times: u32) -> (Self, f64) {
+        let original = mask.coverage();
+        // Half a pixel is a number of samples: the moved picture needs no second drawing.
+        let half = mask.side as i32 / 2;
+        let moved = [(half, 0), (0, half)]
+            .map(|(x, y)| agreement(&original, &mask.coverage_shifted(x, y)).f1());
+        let camera = Camera {
+            width: mask.width,
+            height: mask.height,
+            pixels: camera.pixels / (1u32 << times) as f32,
+            ..camera
+        };
+        let picture = Self {
+            view: view.clone(),
+            camera,
+            original,
+        };
+        (picture, 0.5 * (moved[0] + moved[1]))
+    }
+
     fn figures(&self, level: &Coverage) -> ViewFigures {
         let found: Agreement = agreement(&self.original, level);
         ViewFigures {

@@ -66,11 +66,16 @@ impl View {
     /// The picture is square and the same size for every view; where the tree has an extent
     /// along y of `height` (units of the sphere's radius), that extent is `height_px` pixels.
     pub fn camera(&self, height: f32, height_px: u32) -> Camera {
+        self.camera_in_steps(height, height_px, 1)
+    }
+
+    /// As [`View::camera`], with sides that can be divided into `step` even parts.
+    pub fn camera_in_steps(&self, height: f32, height_px: u32, step: u32) -> Camera {
         // A flat thing has no height to measure; its sphere has.
         let height = if height > 1e-3 { height } else { 2.0 };
         let pixels_per_unit = height_px as f32 / height;
         // A margin for levels that reach a little beyond the original's sphere.
-        let side = ((pixels_per_unit * 2.1).ceil() as u32 + 4).next_multiple_of(2);
+        let side = ((pixels_per_unit * 2.1).ceil() as u32 + 4).next_multiple_of(2 * step);
         let (sin, cos) = self.azimuth_deg.to_radians().sin_cos();
         // Straight from above, "up" is where the view at the same azimuth looks to.
         let up = if self.elevation_deg.abs() > 89.0 {

@@ -1,10 +1,12 @@
 //! Where alpha is the same over whole blocks of texels.
 //!
 //! Leaves on a card are islands: most of its texels lie in the open or well inside a leaf. A map
-//! of a 64th of the texels, which stays in the nearest cache, answers for all of those.
+//! of a 16th of the texels, which stays in the nearest cache, answers for all of those.
 
 /// Edge of a block in texels, as a power of two.
-const SHIFT: u32 = 3;
+const SHIFT: u32 = 2;
+/// Edge of a block in texels.
+pub(super) const BLOCK: i32 = 1 << SHIFT;
 /// Smaller images fit into the cache themselves.
 const LEAST_TEXELS: usize = 4096;
 /// No single alpha.
@@ -64,12 +66,14 @@ mod tests {
     #[test]
     fn a_block_is_mixed_if_a_neighbour_of_its_last_texel_differs() {
         let mut alpha = vec![7u8; 64 * 64];
-        alpha[20 * 64 + 16] = 9; // the first column of block 2, read together with column 15
+        alpha[20 * 64 + 16] = 9; // the first column of block 4, read together with column 15
         let blocks = Blocks::new(64, 64, &alpha);
         assert_eq!(blocks.get(3, 20), Some(7));
         assert_eq!(blocks.get(15, 20), None);
         assert_eq!(blocks.get(16, 20), None);
-        assert_eq!(blocks.get(24, 20), Some(7));
+        assert_eq!(blocks.get(20, 20), Some(7));
+        assert_eq!(blocks.get(15, 19), None);
+        assert_eq!(blocks.get(15, 15), Some(7));
         assert_eq!(blocks.get(62, 62), Some(7));
     }
 }

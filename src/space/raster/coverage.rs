@@ -2,7 +2,7 @@
 
 use super::camera::Corner;
 use super::fragment::Fragment;
-use super::triangle::Triangle;
+use super::triangle::{CENTER, Triangle};
 use super::{Camera, Sampling, Scene};
 
 /// For every sample, whether anything hits it.
@@ -53,8 +53,11 @@ pub fn coverage_with_stats(scene: &Scene, camera: &Camera, sampling: Sampling) -
     let mut samples = vec![0u8; width as usize * height as usize];
     let mut fragments = 0;
     for (id, indices) in scene.geometry.triangles.iter().enumerate() {
-        let material = scene.material(id);
         let at: [Corner; 3] = indices.map(|i| corners[i as usize]);
+        if !Triangle::may_hit(&at, CENTER) {
+            continue;
+        }
+        let material = scene.material(id);
         let Some(triangle) = Triangle::new(at, material.double_sided) else {
             continue;
         };

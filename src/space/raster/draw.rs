@@ -2,7 +2,7 @@
 
 use super::camera::Corner;
 use super::fragment::Fragment;
-use super::triangle::Triangle;
+use super::triangle::{CENTER, Triangle};
 use super::{Camera, Sampling, Scene};
 
 /// The triangle of a sample that nothing hits.
@@ -35,8 +35,11 @@ pub fn draw(scene: &Scene, camera: &Camera, sampling: Sampling) -> Items {
     let mut near = vec![f32::NEG_INFINITY; count];
     let mut items = vec![EMPTY; count];
     for (id, indices) in scene.geometry.triangles.iter().enumerate() {
-        let material = scene.material(id);
         let at: [Corner; 3] = indices.map(|i| corners[i as usize]);
+        if !Triangle::may_hit(&at, CENTER) {
+            continue;
+        }
+        let material = scene.material(id);
         let Some(triangle) = Triangle::new(at, material.double_sided) else {
             continue;
         };

@@ -1,7 +1,8 @@
 //! What the material of one triangle gives at its samples: alpha test and base colour.
 
 use super::camera::Corner;
-use super::texture::{Address, Texture};
+use super::row::TexelRow;
+use super::texture::{Address, Texture, UNIT};
 use super::triangle::{Plane, Triangle};
 use super::{Material, Mips, Sampling, Scene};
 
@@ -123,23 +124,39 @@ impl<'a> Fragment<'a> {
 
     /// Alpha test of the samples of a row from `from` on that are not hit yet.
     pub fn test_row(&self, y: i32, from: i32, samples: &mut [u8]) {
-        let todo = samples
-            .iter_mut()
-            .zip(from..)
-            .filter(|(sample, _)| **sample == 0);
         match (self.texture, self.lod, self.material.cutoff) {
             (Some(texture), Some(lod), Some(cutoff)) if self.is_flat() && self.alpha.is_none() => {
                 // The usual case, with everything that is the same in the row taken out.
                 let (mip, address) = (texture.mip(lod), self.address());
                 let (u, v) = (self.u.row(y), self.v.row(y));
                 let factor = self.material.factor[3];
-                for (sample, x) in todo {
+                if mip.is_single() {
+                    let level = mip.level();
+                    let row = TexelRow {
+                        level,
+                        u,
+                        v,
+                        address,
+                    };
+                    return row.test(from, samples, |alpha| factor * (alpha * UNIT) >= cutoff);
+                }
+                for (sample, x) in samples.iter_mut().zip(from..).filter(|(s, _)| **s == 0) {
                     let alpha = mip.alpha([u.value(x), v.value(x)], address);
                     *sample = (factor * alpha >= cutoff) as u8;
                 }
             }
-            _ => todo.for_each(|(sample, x)| *sample = self.passes(x, y) as u8),
+            _ => {
+                let todo = samples.iter_mut().zip(from..).filter(|(s, _)| **s == 0);
+                todo.for_each(|(sample, x)| *sample = self.passes(x, y) as u8);
+            }
         }
+    }
+
+    /// The four texels of the base level that a sample mixes, and their weights of 65,536; `None`
+    /// without a texture.
+    pub fn texels(&self, x: i32, y: i32) -> Option<([usize; 4], [u32; 4])> {
+        let texture = self.texture?;
+        Some(texture.texels(self.at(x, y).0, self.address()))
     }
 
     /// Linear base colour without vertex colours.

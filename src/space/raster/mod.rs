@@ -9,6 +9,7 @@
 //! Scene = Geometry + Material + Texture   borrowed: geometry stays while alpha is tried out
 //! coverage(scene, camera, sampling)       which samples are hit; no depth, no colour: fast
 //! coverage_multisampled(scene, camera)    the same as a page with four samples a pixel shows it
+//! critical(scene, camera, scores)         the alpha threshold at which each pixel is lost
 //! draw(scene, camera, sampling)           nearest triangle of every sample -> colour, normal, depth
 //! ```
 //!
@@ -17,17 +18,20 @@
 mod blocks;
 mod camera;
 mod coverage;
+mod critical;
 mod draw;
 mod fragment;
 mod image;
 mod mips;
 mod msaa;
+mod row;
 mod shade;
 mod texture;
 mod triangle;
 
 pub use camera::{Camera, Placement};
 pub use coverage::{Coverage, Mask, Stats, coverage, coverage_with_stats};
+pub use critical::{Scores, critical};
 pub use draw::{EMPTY, Items, draw};
 pub use image::Picture;
 pub use msaa::coverage_multisampled;

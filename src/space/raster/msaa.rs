@@ -27,8 +27,11 @@ pub fn coverage_multisampled(scene: &Scene, camera: &Camera) -> Coverage {
     let mut hits = vec![0u8; width as usize * height as usize];
     let places = PLACES.map(|(x, y)| [x, y].map(|p| p * SUBSAMPLES / 16));
     for (id, indices) in scene.geometry.triangles.iter().enumerate() {
-        let material = scene.material(id);
         let at: [Corner; 3] = indices.map(|i| corners[i as usize]);
+        if !Triangle::may_hit(&at, places) {
+            continue;
+        }
+        let material = scene.material(id);
         let Some(triangle) = Triangle::new(at, material.double_sided) else {
             continue;
         };

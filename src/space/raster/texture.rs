@@ -4,7 +4,7 @@
 //! (decoded from sRGB, not weighted by alpha), alpha as it is. Alpha lies in planes of its own, so
 //! that it can be replaced and drawn without touching colours.
 
-use super::blocks::Blocks;
+use super::blocks::{BLOCK, Blocks};
 use super::mips;
 
 /// A sampler's wrap mode.
@@ -100,6 +100,15 @@ impl Texture {
         (level.width, level.height, &level.alpha)
     }
 
+    /// The four texels of the base level around `uv`, and their weights of 65,536.
+    pub(super) fn texels(&self, uv: [f32; 2], address: Address) -> ([usize; 4], [u32; 4]) {
+        let base = &self.levels[0];
+        let (texel, [right, below]) = base.place(uv, address);
+        let (left, above) = (256 - right, 256 - below);
+        let weights = [left * above, right * above, left * below, right * below];
+        (base.neighbours(texel, address), weights)
+    }
+
     /// The levels that a level of detail lies between, 0 being the base.
     pub(super) fn mip(&self, lod: f32) -> Mip<'_> {
         let last = self.levels.len() - 1;
@@ -115,6 +124,9 @@ impl Texture {
         }
     }
 }
+
+/// The unit of mixed alpha: 255 levels of 256 x 256 weights are one.
+pub(super) const UNIT: f32 = 1.0 / (255.0 * 65_536.0);
 
 /// How a texture is read.
 #[derive(Clone, Copy)]
@@ -132,7 +144,17 @@ pub(super) struct Mip<'a> {
     coarser: Option<(&'a Level, f32)>,
 }
 
-impl Mip<'_> {
+impl<'a> Mip<'a> {
+    /// The finer of its two levels.
+    pub fn level(&self) -> &'a Level {
+        self.finer
+    }
+
+    /// Whether it is one level, nothing mixed in from the next.
+    pub fn is_single(&self) -> bool {
+        self.coarser.is_none()
+    }
+
     /// Alpha (0 to 1) at `uv`.
     #[inline]
     pub fn alpha(&self, uv: [f32; 2], address: Address) -> f32 {
@@ -141,7 +163,7 @@ impl Mip<'_> {
             None => fine,
             Some((level, part)) => fine + (level.alpha_at(uv, address) - fine) * part,
         };
-        fixed * (1.0 / (255.0 * 65_536.0))
+        fixed * UNIT
     }
 
     /// Linear RGB at `uv`; white where the texture has alpha alone.
@@ -174,7 +196,7 @@ impl Level {
 
     /// Where `uv` lies: the texel to the left above, and how far from its middle in 256ths.
     #[inline]
-    fn place(&self, [u, v]: [f32; 2], address: Address) -> ([i32; 2], [u32; 2]) {
+    pub fn place(&self, [u, v]: [f32; 2], address: Address) -> ([i32; 2], [u32; 2]) {
         let (mut x, mut y) = (fixed(u, self.width), fixed(v, self.height));
         if !address.linear {
             // To the middle of the texel that holds the point: its neighbours weigh nothing.
@@ -207,12 +229,33 @@ impl Level {
     /// graphics processors.
     #[inline]
     fn alpha_at(&self, uv: [f32; 2], address: Address) -> f32 {
-        let (texel, [right, below]) = self.place(uv, address);
-        if self.holds(texel)
-            && let Some(alpha) = self.blocks.get(texel[0], texel[1])
-        {
-            return (alpha as u32 * 65_536) as f32;
+        let (texel, part) = self.place(uv, address);
+        match self.block(texel) {
+            Some(alpha) => (alpha as u32 * 65_536) as f32,
+            None => self.mixed(texel, part, address),
         }
+    }
+
+    /// The alpha of a texel and its neighbours, where it is one and known to be.
+    #[inline]
+    pub fn block(&self, texel: [i32; 2]) -> Option<u8> {
+        let inside = self.holds(texel);
+        inside
+            .then(|| self.blocks.get(texel[0], texel[1]))
+            .flatten()
+    }
+
+    /// The texels (left above; end) for which [`Level::block`] has the answer that it has for one.
+    #[inline]
+    pub fn block_around(&self, texel: [i32; 2]) -> ([i32; 2], [i32; 2]) {
+        let low = texel.map(|t| t & !(BLOCK - 1));
+        let end = [self.width as i32 - 1, self.height as i32 - 1];
+        (low, std::array::from_fn(|i| (low[i] + BLOCK).min(end[i])))
+    }
+
+    /// Alpha mixed from a texel and its neighbours, in units of 1 / (255 * 65536).
+    #[inline]
+    pub fn mixed(&self, texel: [i32; 2], [right, below]: [u32; 2], address: Address) -> f32 {
         let texels = self.neighbours(texel, address);
         let [a, b, c, d] = texels.map(|i| self.alpha[i] as u32);
         let top = a * (256 - right) + b * right;

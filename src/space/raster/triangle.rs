@@ -47,12 +47,14 @@ impl Plane {
 /// A [`Plane`] along one row of samples.
 #[derive(Clone, Copy)]
 pub(super) struct Row {
-    at: f32,
-    dx: f32,
-    x0: f32,
+    pub at: f32,
+    /// Change from a sample to the next.
+    pub dx: f32,
+    pub x0: f32,
 }
 
 impl Row {
+    #[inline]
     pub fn value(&self, x: i32) -> f32 {
         self.at + self.dx * (x as f32 - self.x0)
     }
@@ -84,6 +86,22 @@ impl Triangle {
         })
     }
 
+    /// Whether any sample may be inside: most triangles of a far tree lie between all samples, and
+    /// this is all that they cost. `places` are those of [`Triangle::scan_places`].
+    pub fn may_hit<const N: usize>(corners: &[Corner; 3], places: [[i32; 2]; N]) -> bool {
+        let [a, b, c] = corners;
+        let (x0, x1) = (a.x.min(b.x).min(c.x), a.x.max(b.x).max(c.x));
+        let (y0, y1) = (a.y.min(b.y).min(c.y), a.y.max(b.y).max(c.y));
+        // Whether there is a whole number k with low <= 256 k + place <= high.
+        let between = |low: i32, high: i32, place: i32| {
+            high.saturating_sub(place).div_euclid(SUBSAMPLES)
+                > low.saturating_sub(place + 1).div_euclid(SUBSAMPLES)
+        };
+        places
+            .iter()
+            .any(|&[x, y]| between(x0, x1, x) && between(y0, y1, y))
+    }
+
     /// How a quantity with these values at the model's corners varies over the screen.
     pub fn plane(&self, values: [f32; 3]) -> Plane {
         let [a, b, c] = &self.corners;
@@ -108,8 +126,7 @@ impl Triangle {
 
     /// Calls `span(y, from, to)` for every row with samples `from..to` inside.
     pub fn scan(&self, width: i32, height: i32, mut span: impl FnMut(i32, i32, i32)) {
-        let center = [[SUBSAMPLES / 2; 2]];
-        self.scan_places(width, height, center, |y, [(from, to)]| {
+        self.scan_places(width, height, CENTER, |y, [(from, to)]| {
             if from < to {
                 span(y, from, to);
             }
@@ -164,8 +181,11 @@ impl Triangle {
     }
 }
 
-/// Rows shorter than this are stepped through; longer ones are worth three divisions.
-const SHORT_ROW: i32 = 12;
+/// The place of a pixel's only sample.
+pub(super) const CENTER: [[i32; 2]; 1] = [[SUBSAMPLES / 2; 2]];
+
+/// Rows shorter than this are stepped through; longer ones are solved for their ends.
+const SHORT_ROW: i32 = 4;
 
 fn cross(a: &Corner, b: &Corner, c: &Corner) -> i64 {
     let (bx, by) = ((b.x - a.x) as i64, (b.y - a.y) as i64);
@@ -179,6 +199,8 @@ struct Edge {
     value: i64,
     right: i64,
     down: i64,
+    /// One over the size of `right`.
+    per_right: f64,
 }
 
 impl Edge {
@@ -189,11 +211,36 @@ impl Edge {
         let (px, py) = (x as i64 - from.x as i64, y as i64 - from.y as i64);
         // A sample on the edge itself belongs to the triangle whose top or left edge it is.
         let owns = dy < 0 || (dy == 0 && dx > 0);
+        let right = -dy * grain;
         Self {
             value: dx * py - dy * px - if owns { 0 } else { 1 },
-            right: -dy * grain,
+            right,
             down: dx * grain,
+            per_right: 1.0 / right.abs() as f64,
         }
+    }
+
+    /// The first step to the right that is inside, where `right` is positive.
+    fn enters(&self) -> i64 {
+        if self.value >= 0 {
+            return 0;
+        }
+        // A multiplication that is off by less than one, then put right.
+        let steps = (-self.value as f64 * self.per_right) as i64;
+        steps + i64::from(steps.saturating_mul(self.right) < -self.value)
+    }
+
+    /// The last step to the right that is inside, where `right` is negative; -1 if none is.
+    fn leaves(&self) -> i64 {
+        if self.value < 0 {
+            return -1;
+        }
+        let steps = (self.value as f64 * self.per_right) as i64;
+        let (over, next) = (
+            steps.saturating_mul(-self.right),
+            (steps + 1).saturating_mul(-self.right),
+        );
+        steps - i64::from(over > self.value) + i64::from(next <= self.value)
     }
 }
 
@@ -222,9 +269,9 @@ fn solve_row(edges: &[Edge; 3], last: i32) -> (i32, i32) {
     let (mut from, mut to) = (0i64, last as i64);
     for edge in edges {
         if edge.right > 0 {
-            from = from.max((-edge.value + edge.right - 1).div_euclid(edge.right));
+            from = from.max(edge.enters());
         } else if edge.right < 0 {
-            to = to.min(edge.value.div_euclid(-edge.right));
+            to = to.min(edge.leaves());
         } else if edge.value < 0 {
             return (0, 0);
         }
