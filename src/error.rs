@@ -46,8 +46,16 @@ pub enum Error {
         /// Which recipe key helps.
         help: String,
     },
+    /// Trees of a batch failed.
+    #[error("{what}")]
+    Batch {
+        /// Which, and why.
+        what: String,
+        /// The least of their exit codes.
+        code: u8,
+    },
     /// The user stopped the run (Ctrl-C).
-    #[error("interrupted; nothing was written")]
+    #[error("interrupted; nothing that was not finished was written")]
     Interrupted,
     /// A fault of ours.
     #[error(
@@ -67,6 +75,7 @@ impl Error {
         match self {
             Self::Input { .. } | Self::Usage { .. } | Self::Io { .. } => 2,
             Self::Refused { .. } => 3,
+            Self::Batch { code, .. } => *code,
             Self::Interrupted => 130,
             Self::Internal { .. } => 1,
         }

@@ -42,6 +42,28 @@ pub enum Wanted {
     Levels(usize),
 }
 
+impl std::fmt::Display for Limit {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        match self {
+            Self::Count(n) => write!(f, "{n}"),
+            Self::Share(s) => write!(f, "{}%", s * 100.0),
+        }
+    }
+}
+
+/// As on the command line.
+impl std::fmt::Display for Wanted {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        match self {
+            Self::Levels(n) => write!(f, "--levels {n}"),
+            Self::Limits(limits) => {
+                let all: Vec<String> = limits.iter().map(Limit::to_string).collect();
+                write!(f, "--triangles {}", all.join(","))
+            }
+        }
+    }
+}
+
 impl Default for Wanted {
     fn default() -> Self {
         Self::Levels(DEFAULT_LEVELS)
@@ -177,6 +199,16 @@ mod tests {
 
     fn of(wanted: Wanted, all: u64) -> Vec<Rung> {
         rungs(&wanted, &Scene::default(), all, LEAST_TRIANGLES).unwrap()
+    }
+
+    #[test]
+    fn levels_are_written_as_on_the_command_line() {
+        let limits = vec![Limit::Share(0.1), Limit::Share(0.005), Limit::Count(24)];
+        assert_eq!(
+            Wanted::Limits(limits).to_string(),
+            "--triangles 10%,0.5%,24"
+        );
+        assert_eq!(Wanted::default().to_string(), "--levels 4");
     }
 
     #[test]

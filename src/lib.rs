@@ -12,6 +12,8 @@
 //! ```
 
 #[cfg(feature = "bake")]
+pub mod batch;
+#[cfg(feature = "bake")]
 pub mod botany;
 #[cfg(feature = "bake")]
 pub mod cli;

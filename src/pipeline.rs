@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use serde_json::Value;
 
-use crate::botany::load::load;
+use crate::botany::load::{Limits, load, load_slice, read, references};
 use crate::botany::model::Model;
 use crate::botany::recognise::{RecogniseOptions, recognise};
 use crate::botany::tree::Tree;
@@ -15,7 +15,9 @@ use crate::detail::wood::Wood;
 use crate::error::{Error, Result};
 use crate::export::combined::{Packed, extras, write_combined};
 use crate::export::gltf::{encode_images, write_glb};
-use crate::export::manifest::{self, FORMAT, Manifest, Provenance, Range, SUFFIX, VERSION};
+use crate::export::manifest::{
+    self, FORMAT, Manifest, Provenance, Range, Reference, SUFFIX, VERSION,
+};
 use crate::export::original::Original;
 use crate::export::package::Package;
 use crate::export::surface::{self, scene_of_model};
@@ -76,8 +78,11 @@ pub fn bake(request: &Request, watch: &dyn Watch) -> Result<Baked> {
     check(&request.scene)?;
     let package = Package::start(&request.output, request.force)?;
     begin(watch, "load", 1)?;
-    let provenance = provenance(request)?;
-    let model = load(&request.input)?;
+    // Read once: what is described is what is baked, even if the file changes meanwhile.
+    let input = read(&request.input, &Limits::default())?;
+    let provenance = provenance(request, &input)?;
+    let model = load_slice(&input, &request.input, &Limits::default())?;
+    drop(input);
     let rungs = rungs(
         &request.wanted,
         &request.scene,
@@ -122,14 +127,33 @@ pub fn bake(request: &Request, watch: &dyn Watch) -> Result<Baked> {
     })
 }
 
-fn provenance(request: &Request) -> Result<Provenance> {
-    let bytes = std::fs::read(&request.input).map_err(|e| Error::io(&request.input, "open", e))?;
+/// Where a package comes from; `input` are the input's bytes.
+///
+/// # Errors
+/// Those of [`references`].
+pub fn provenance(request: &Request, input: &[u8]) -> Result<Provenance> {
     let name = request.input.file_name().unwrap_or_default();
+    let others = references(input, &request.input, &Limits::default())?;
+    let mut asked = request.wanted.to_string();
+    if let Some(pixels) = request.max_error_px {
+        asked += &format!(" --max-error {pixels}");
+    }
+    if request.accept {
+        asked += " --accept";
+    }
     Ok(Provenance {
         generator: concat!("pleach ", env!("CARGO_PKG_VERSION")).into(),
         input: name.to_string_lossy().into_owned(),
-        input_bytes: bytes.len() as u64,
-        input_sha256: sha256(&bytes),
+        input_bytes: input.len() as u64,
+        input_sha256: sha256(input),
+        references: others
+            .into_iter()
+            .map(|(uri, bytes)| Reference {
+                uri,
+                sha256: sha256(&bytes),
+            })
+            .collect(),
+        asked,
     })
 }
 
@@ -160,7 +184,10 @@ fn levels(
     let mut manifest = Manifest {
         format: FORMAT.into(),
         version: VERSION,
-        recipe: request.recipe.clone(),
+        recipe: Recipe {
+            memory_mib: 0,
+            ..request.recipe.clone()
+        },
         scene: request.scene.clone(),
         tree: describer.original(),
         subtrees: describer.subtrees(),

@@ -72,6 +72,9 @@ pub struct Recipe {
     pub validity_px: f64,
     /// Share of a group's visible area that the adaptive loop may lose, 0 to 1.
     pub tolerance: f64,
+    /// Memory that the trees of a batch may take together, MiB, 0 to 1,048,576; 0: half of the
+    /// machine's. Changes no package.
+    pub memory_mib: u32,
 }
 
 impl Default for Recipe {
@@ -99,6 +102,7 @@ impl Knobs for Recipe {
             range("refine_rounds", self.refine_rounds.into(), 0.0, 100.0),
             range("validity_px", self.validity_px, 0.1, 64.0),
             range("tolerance", self.tolerance, 0.0, 1.0),
+            range("memory_mib", self.memory_mib.into(), 0.0, 1_048_576.0),
             range("training_views", self.training_views.into(), 4.0, 64.0),
         ]
     }
@@ -112,6 +116,16 @@ impl Recipe {
             Preset::Balanced => Self::balanced(),
             Preset::Best => Self::best(),
         }
+    }
+
+    /// Whether both make the same package.
+    pub fn bakes_like(&self, other: &Self) -> bool {
+        let memory_mib = self.memory_mib;
+        let other = Self {
+            memory_mib,
+            ..other.clone()
+        };
+        *self == other
     }
 
     /// A quick look.
@@ -152,6 +166,7 @@ impl Recipe {
             billboards: vec![Billboard::Cross, Billboard::Strip],
             validity_px: 3.0,
             tolerance: 0.2,
+            memory_mib: 0,
         }
     }
 }

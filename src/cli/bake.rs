@@ -4,7 +4,9 @@ use std::io::Write as _;
 use std::path::PathBuf;
 use std::time::Instant;
 
+use super::batch;
 use super::progress::{Bars, catch_ctrl_c};
+use crate::batch::Batch;
 use crate::error::{Error, Result};
 use crate::knobs::read;
 use crate::pipeline::{Baked, Limit, Request, Wanted, bake, to_json};
@@ -13,14 +15,22 @@ use crate::report::schema::{Bake, Level, Report};
 use crate::scene::Scene;
 use crate::watch::Clock;
 
-/// Bake levels of detail of a tree.
+/// Bake levels of detail of a tree, or of many.
 #[derive(clap::Args, Debug)]
 pub struct Args {
-    /// The tree: .glb or .gltf.
-    input: PathBuf,
-    /// Folder of the package.
+    /// The tree: .glb or .gltf. Several are a batch.
+    #[arg(required = true, value_name = "INPUT")]
+    inputs: Vec<PathBuf>,
+    /// Folder of the package; in a batch, of a folder for each tree.
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
+    /// A package for each tree in a folder of its name under DIR, also where there is one tree; what has not changed
+    /// since the last run is not baked again.
+    #[arg(long)]
+    batch: bool,
+    /// In a batch: bake again what has not changed.
+    #[arg(long)]
+    rebake: bool,
     /// One level for each: a count ("5000") or a share of the original ("10%"), wood included.
     #[arg(long, value_delimiter = ',', value_name = "N|%", value_parser = limit)]
     triangles: Vec<Limit>,
@@ -61,6 +71,16 @@ pub fn run(args: Args) -> Result<()> {
     let started = Instant::now();
     let request = request(&args)?;
     catch_ctrl_c()?;
+    if args.batch || args.inputs.len() > 1 {
+        let batch = Batch {
+            inputs: args.inputs,
+            output: args.output,
+            request,
+            rebake: args.rebake,
+            threads: args.threads.into(),
+        };
+        return batch::run(&batch, args.quiet, args.json);
+    }
     let clock = Clock::new(Bars::new(args.quiet));
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(args.threads.into())
@@ -96,7 +116,8 @@ pub fn run(args: Args) -> Result<()> {
 fn request(args: &Args) -> Result<Request> {
     let preset = Recipe::preset(args.preset);
     Ok(Request {
-        input: args.input.clone(),
+        // The first of them; a batch fills in each.
+        input: args.inputs.first().cloned().unwrap_or_default(),
         output: args.output.clone(),
         wanted: match args.triangles.is_empty() {
             true => args
@@ -138,7 +159,7 @@ fn limit(text: &str) -> std::result::Result<Limit, String> {
 }
 
 /// A closed pipe is no fault: the reader has seen enough.
-fn print(text: &str) -> Result<()> {
+pub(super) fn print(text: &str) -> Result<()> {
     match std::io::stdout().write_all(text.as_bytes()) {
         Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(Error::io(
             std::path::Path::new("standard output"),

@@ -1,6 +1,7 @@
 //! The command line: one file a command.
 
 mod bake;
+mod batch;
 mod evaluate;
 mod grow;
 mod inspect;

@@ -53,6 +53,21 @@ pub struct Provenance {
     pub input_bytes: u64,
     /// SHA-256 of the input file (not of files that it refers to), hexadecimal.
     pub input_sha256: String,
+    /// The files that it refers to, in its order.
+    #[serde(default)]
+    pub references: Vec<Reference>,
+    /// Which levels were asked for, as on the command line.
+    #[serde(default)]
+    pub asked: String,
+}
+
+/// A file that the input refers to.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Reference {
+    /// As the input names it, relative to its folder.
+    pub uri: String,
+    /// SHA-256, hexadecimal.
+    pub sha256: String,
 }
 
 /// What the original is.

@@ -75,8 +75,39 @@ pub fn load(path: &Path) -> Result<Model> {
 /// # Errors
 /// As [`load`].
 pub fn load_with(path: &Path, limits: &Limits) -> Result<Model> {
-    let bytes = container::read_file(path, limits)?;
+    let bytes = read(path, limits)?;
     load_slice(&bytes, path, limits)
+}
+
+/// The bytes of a .glb or .gltf, without the files that it refers to.
+///
+/// # Errors
+/// [`Error::Io`], or [`Error::Input`] where it is no regular file or too large.
+pub fn read(path: &Path, limits: &Limits) -> Result<Vec<u8>> {
+    container::read_file(path, limits)
+}
+
+/// The files that a .glb or .gltf in memory refers to: each URI and its bytes.
+///
+/// # Errors
+/// As [`load`], where a file can't be read or lies outside the document's folder.
+pub fn references(bytes: &[u8], path: &Path, limits: &Limits) -> Result<Vec<(String, Vec<u8>)>> {
+    let (document, _) = container::open(bytes, path, limits)?;
+    let buffers = document.buffers.iter().enumerate();
+    let buffers = buffers.map(|(i, b)| (format!("buffer {i}"), &b.uri));
+    let images = document.images.iter().enumerate();
+    let images = images.map(|(i, image)| (format!("image {i}"), &image.uri));
+    let mut out = Vec::new();
+    for (place, uri) in buffers.chain(images) {
+        if let Some(uri) = uri
+            && !uri
+                .get(..5)
+                .is_some_and(|s| s.eq_ignore_ascii_case("data:"))
+        {
+            out.push((uri.clone(), uri::fetch(path, uri, &place, limits)?.0));
+        }
+    }
+    Ok(out)
 }
 
 /// Reads a .glb or .gltf that is already in memory; `path` names it and anchors relative URIs.
