@@ -200,6 +200,94 @@ fn a_level_is_also_measured_at_its_own_height_and_half_of_it() {
     assert!((report.levels[1].distance_m - distance).abs() < 1e-9);
 }
 
+#[test]
+fn the_original_itself_looks_like_the_original_and_moves_like_it() {
+    let mut original = crown(300, 0);
+    original.materials[0].base_color_factor = [0.1, 0.3, 0.05, 1.0];
+    let settings = Settings {
+        heights_px: vec![64, 32, 48],
+        own_heights_px: vec![Some(64), Some(48)],
+        views: 6,
+        elevations_deg: vec![0.0, 60.0],
+        appearance: true,
+        ..Settings::default()
+    };
+    let report = evaluate(
+        (&original, "a"),
+        &[(&original, "b"), (&crown(300, 4), "c")],
+        &settings,
+    );
+    let [same, thin] = &report.levels[..] else {
+        panic!("two levels")
+    };
+    for size in &same.sizes {
+        let look = size.appearance.as_ref().unwrap();
+        assert_eq!(look.views.len(), 7);
+        assert_eq!((look.flip.worst, look.soft_f1.worst), (0.0, 1.0));
+        assert_eq!(
+            (look.incorrect_share_8.worst, look.psnr_db.worst),
+            (0.0, 100.0)
+        );
+        assert_eq!(look.depth_error.as_ref().unwrap().worst, 0.0);
+        assert!(look.normal_error_deg.as_ref().unwrap().worst < 0.1);
+    }
+    let orbit = same.orbit.as_ref().unwrap();
+    assert_eq!((orbit.height_px, orbit.step_deg), (64, 1.0));
+    assert_eq!(orbit.level, orbit.original);
+    assert!(orbit.level.flip.mean > 0.001);
+    // From the level that is the original to the next one is that one's own error.
+    let jump = same.jump_to_next.as_ref().unwrap();
+    assert_eq!(jump.height_px, 48);
+    let own = thin.sizes.iter().find(|s| s.height_px == 48).unwrap();
+    let look = own.appearance.as_deref().unwrap();
+    assert_eq!(jump.appearance.flip, look.flip);
+    assert!((jump.f1.mean - own.f1.mean).abs() < 0.01, "{jump:?}");
+    assert!(
+        look.flip.mean > 0.01 && look.soft_recall.mean < 0.98 && look.soft_precision.mean > 0.98
+    );
+    assert!(thin.jump_to_next.is_none());
+}
+
+/// Both halves of a wall turned by a normal map: the light on them tells which way it turns.
+#[test]
+fn a_normal_map_turns_the_surface_it_is_on() {
+    let mut wall = Model {
+        materials: vec![Material::default()],
+        objects: vec![Object::default()],
+        ..Model::default()
+    };
+    quad(&mut wall, Vec3::ZERO, Vec3::X * 0.5, Vec3::Y * 0.5);
+    let flat = wall.clone();
+    // Half way to the top of the image, where v falls: up on this wall.
+    wall.images.push(Image {
+        width: 1,
+        height: 1,
+        rgba: vec![128, 218, 218, 255],
+        ..Image::default()
+    });
+    wall.materials[0].normal = Some(TextureRef {
+        image: 0,
+        uv_set: 0,
+        wrap: [Wrap::Repeat; 2],
+        linear: true,
+    });
+    let settings = Settings {
+        heights_px: vec![32],
+        views: 2,
+        elevations_deg: vec![0.0],
+        appearance: true,
+        ..Settings::default()
+    };
+    let report = evaluate((&flat, "a"), &[(&wall, "b")], &settings);
+    let look = report.levels[0].sizes[0].appearance.as_ref().unwrap();
+    let front = &look.views[0];
+    let angle = front.normal_error_deg.unwrap();
+    assert!((angle - 45.0).abs() < 1.0, "{angle}");
+    assert_eq!(front.depth_error, Some(0.0));
+    // Towards the sky and the sun: lighter.
+    assert!(front.color_shift_delta_e > 5.0);
+}
+
 /// three.js r187 in headless Chromium (SwiftShader, four samples) on the oak, from the ten views
 /// that `views(10, 11.0)` gives: F1 and covered area against the supersampled oak.
 #[test]
@@ -245,7 +333,17 @@ fn the_command_prints_the_report_and_writes_it_with_pictures() {
     let out = folder.path().join("new/folder");
     let level = format!("{oak}@32");
     let arguments = [
-        oak, &level, "--json", "--client", "--height", "64", "--views", "4", "-o",
+        oak,
+        &level,
+        "--json",
+        "--client",
+        "--height",
+        "64",
+        "--views",
+        "4",
+        "--elevations",
+        "0,30,-15",
+        "-o",
     ];
     let done = evaluate_command(&[&arguments[..], &[out.to_str().unwrap()]].concat());
     assert!(
@@ -282,6 +380,7 @@ fn the_command_refuses_what_it_cannot_read_or_measure() {
         &[oak, oak, "--height", "0"],
         &[oak, oak, "--height", "64,-3"],
         &[oak, oak, "--views", "0"],
+        &[oak, oak, "--elevations", "90"],
     ] {
         let done = evaluate_command(wrong);
         assert_eq!(done.status.code(), Some(2), "{wrong:?}");

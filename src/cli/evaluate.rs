@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use crate::botany::Model;
 use crate::botany::load::load;
 use crate::error::{Error, Result};
-use crate::report::schema::{Level, Report, SizeFigures};
-use crate::report::{Settings, contact_sheet, evaluate};
+use crate::report::schema::{Figure, Level, Report, SizeFigures};
+use crate::report::{Settings, contact_sheet, evaluate, start_height_px};
 use crate::space::raster::Sampling;
 use crate::space::view::View;
 
@@ -15,25 +15,31 @@ use crate::space::view::View;
 pub struct Args {
     /// The original tree (.glb or .gltf).
     original: PathBuf,
-    /// The levels, nearest first. FILE@PIXELS: the tree's height from which a level is shown; it
-    /// is measured there and at half of it as well.
+    /// The levels, nearest first. FILE@PIXELS: the tree's height from which a level is shown (files
+    /// of pleach say so themselves); it is measured there and at half of it as well.
     #[arg(required = true, value_name = "LEVEL[@PIXELS]")]
     levels: Vec<String>,
     /// Folder for report.json and contact.png.
     #[arg(short, long)]
     output: Option<PathBuf>,
     /// Heights of the tree on the screen, pixels.
-    #[arg(long, value_delimiter = ',', default_value = "256,64", value_parser = clap::value_parser!(u32).range(4..=4096))]
+    #[arg(long, value_delimiter = ',', default_value = "512,256,128,64,32", value_parser = clap::value_parser!(u32).range(4..=4096))]
     height: Vec<u32>,
-    /// Views at least: azimuths at elevations -15, 0 and 30 degrees, and the top.
-    #[arg(long, default_value_t = crate::space::view::DEFAULT_VIEWS, value_parser = parse_views)]
+    /// Views at least: equal azimuths at each elevation, and the top.
+    #[arg(long, default_value_t = 26, value_parser = parse_views)]
     views: usize,
+    /// Elevations of the views, degrees above the horizon.
+    #[arg(long, value_delimiter = ',', default_value = "0,30,-15,60", allow_hyphen_values = true, value_parser = parse_elevation)]
+    elevations: Vec<f32>,
     /// Azimuth of the first view, degrees; another offset gives another set of views.
     #[arg(long, default_value_t = 0.0, allow_hyphen_values = true)]
     azimuth_offset: f32,
     /// Draw the levels also as an engine does: box mips, alpha test, fourfold multisampling.
     #[arg(long)]
     client: bool,
+    /// Compare silhouettes alone: no colours, distances, normals and jumps; a fraction of the time.
+    #[arg(long)]
+    silhouettes: bool,
     /// Print the report as JSON instead of a table.
     #[arg(long)]
     json: bool,
@@ -46,17 +52,29 @@ fn parse_views(text: &str) -> std::result::Result<usize, String> {
     }
 }
 
+fn parse_elevation(text: &str) -> std::result::Result<f32, String> {
+    match text.trim().parse() {
+        Ok(degrees @ -89.0..=89.0) => Ok(degrees),
+        _ => Err("give degrees from -89 to 89".into()),
+    }
+}
+
 /// Runs the command.
 pub fn run(args: &Args) -> Result<()> {
     let original = load(&args.original)?;
-    let (files, own_heights_px) = split(&args.levels);
+    let (files, mut own_heights_px) = split(&args.levels);
+    for (file, height) in files.iter().zip(&mut own_heights_px) {
+        *height = height.or_else(|| start_height_px(file));
+    }
     let levels: Vec<Model> = files.iter().map(|file| load(file)).collect::<Result<_>>()?;
     let settings = Settings {
         heights_px: args.height.clone(),
         own_heights_px,
         views: args.views,
         azimuth_offset_deg: args.azimuth_offset,
+        elevations_deg: args.elevations.clone(),
         client: args.client,
+        appearance: !args.silhouettes,
     };
     let names: Vec<String> = files.iter().map(|file| file_name(file)).collect();
     let named: Vec<(&Model, &str)> = levels
@@ -199,7 +217,75 @@ fn table(report: &Report) -> String {
             head.clear();
         }
     }
-    out + "\nE: error over that of the original moved by half a pixel; 1 is as near as that. Reference: 4 x 4 samples a pixel.\n"
+    out += "\nE: error over that of the original moved by half a pixel; 1 is as near as that. Reference: 4 x 4 samples a pixel.\n";
+    if report.levels.iter().any(|l| l.orbit.is_some()) {
+        out += &looks(report);
+    }
+    out
+}
+
+/// Colours and what lies inside, and what changes: means over views.
+fn looks(report: &Report) -> String {
+    let mut out = format!(
+        "\n{:<28}{:>6}{:>8}{:>9}{:>9}{:>7}{:>7}{:>7}{:>8}{:>8}{:>9}\n",
+        "file",
+        "px",
+        "soft F1",
+        "off 8",
+        "off 32",
+        "SSIM",
+        "PSNR",
+        "FLIP",
+        "colour",
+        "depth",
+        "normals"
+    );
+    for level in &report.levels {
+        for size in &level.sizes {
+            let Some(look) = &size.appearance else {
+                continue;
+            };
+            let inside = |f: &Option<Figure>| f.as_ref().map_or(f64::NAN, |f| f.mean);
+            out += &format!(
+                "{:<28}{:>6}{:>8.3}{:>8.1}%{:>8.1}%{:>7.3}{:>7.1}{:>7.3}{:>8.2}{:>8.3}{:>9.1}\n",
+                level.file,
+                size.height_px,
+                look.soft_f1.mean,
+                100.0 * look.incorrect_share_8.mean,
+                100.0 * look.incorrect_share_32.mean,
+                look.ssim.mean,
+                look.psnr_db.mean,
+                look.flip.mean,
+                look.color_shift_delta_e.mean,
+                inside(&look.depth_error),
+                inside(&look.normal_error_deg),
+            );
+        }
+    }
+    out += "\nOff: pixels off by more than 8 or 32 of 255. PSNR in dB, colour in delta E, depth in tree heights, normals in degrees.\n";
+    for level in &report.levels {
+        if let Some(jump) = &level.jump_to_next {
+            out += &format!(
+                "{} to the next at {} px: F1 {:.3}, FLIP {:.3}, area {:.3}\n",
+                level.file,
+                jump.height_px,
+                jump.f1.mean,
+                jump.appearance.flip.mean,
+                jump.area_ratio.mean
+            );
+        }
+        if let Some(orbit) = &level.orbit {
+            out += &format!(
+                "{} turned by {} degree at {} px: FLIP {:.3}, the original {:.3}\n",
+                level.file,
+                orbit.step_deg,
+                orbit.height_px,
+                orbit.level.flip.mean,
+                orbit.original.flip.mean
+            );
+        }
+    }
+    out
 }
 
 fn lines(level: &Level) -> impl Iterator<Item = (&'static str, &SizeFigures)> {

@@ -2,7 +2,7 @@
 
 use crate::botany::Model;
 use crate::botany::model::{self, AlphaMode, Frame, TextureRef};
-use crate::space::raster::{Geometry, Material, Placement, Scene, Texture, Wrap};
+use crate::space::raster::{Geometry, Material, Placement, Relief, Scene, Texture, Wrap};
 
 /// Alpha from which a blended sample counts as covered.
 const BLEND_CUTOFF: f32 = 0.5;
@@ -75,6 +75,23 @@ impl<'m> Drawable<'m> {
         }
     }
 
+    /// The materials' normal maps, where their pixels are kept.
+    pub fn reliefs(&self) -> Vec<Option<Relief<'_>>> {
+        let relief = |source: &'m model::Material| {
+            let map = source.normal?;
+            let image = &self.model.images[map.image as usize];
+            (!image.rgba.is_empty()).then_some(Relief {
+                rgba: &image.rgba,
+                width: image.width,
+                height: image.height,
+                wrap: map.wrap.map(wrap),
+                uv_set: map.uv_set,
+                scale: source.normal_scale,
+            })
+        };
+        self.model.materials.iter().map(relief).collect()
+    }
+
     /// Puts this file's normalised space into another file's.
     pub fn placement_in(&self, frame: Frame) -> Placement {
         let own = self.model.frame;
@@ -115,11 +132,15 @@ fn address(material: &mut Material, texture: u32, reference: &TextureRef) {
     material.texture = Some(texture);
     material.uv_set = reference.uv_set;
     material.linear = reference.linear;
-    material.wrap = reference.wrap.map(|wrap| match wrap {
+    material.wrap = reference.wrap.map(wrap);
+}
+
+fn wrap(wrap: model::Wrap) -> Wrap {
+    match wrap {
         model::Wrap::Repeat => Wrap::Repeat,
         model::Wrap::Mirror => Wrap::Mirror,
         model::Wrap::Clamp => Wrap::Clamp,
-    });
+    }
 }
 
 fn texture(image: &model::Image, colors: bool) -> Texture {

@@ -2,13 +2,14 @@
 
 use rayon::prelude::*;
 
+use super::appearance::{Asked, appearance};
 use super::cost::{draw_calls, texture_bytes};
 use super::drawable::Drawable;
 use super::reference::Reference;
 use super::schema::{Level, Report, SizeFigures};
 use crate::botany::Model;
 use crate::space::raster::{Sampling, coverage_with_stats};
-use crate::space::view::{DEFAULT_VIEWS, View, views};
+use crate::space::view::{DEFAULT_VIEWS, ELEVATIONS, View, views_at};
 
 /// How levels are evaluated.
 #[derive(Clone, Debug, PartialEq)]
@@ -18,12 +19,16 @@ pub struct Settings {
     /// For each level the height from which it is shown, pixels: it is measured there and at half
     /// of it (twice the distance) as well. May be shorter than the list of levels.
     pub own_heights_px: Vec<Option<u32>>,
-    /// Number of views, the top included (at least; see [`views`]).
+    /// Number of views, the top included (at least; see [`views_at`]).
     pub views: usize,
     /// Azimuth of the first view, degrees.
     pub azimuth_offset_deg: f32,
+    /// Elevations of the views, degrees above the horizon.
+    pub elevations_deg: Vec<f32>,
     /// Whether levels and original are also drawn as an engine draws them.
     pub client: bool,
+    /// Whether colours, distances, normals and jumps are measured, too.
+    pub appearance: bool,
 }
 
 impl Default for Settings {
@@ -33,7 +38,9 @@ impl Default for Settings {
             own_heights_px: Vec::new(),
             views: DEFAULT_VIEWS,
             azimuth_offset_deg: 0.0,
+            elevations_deg: ELEVATIONS.to_vec(),
             client: false,
+            appearance: false,
         }
     }
 }
@@ -49,7 +56,7 @@ impl Settings {
 
     /// The views that these settings ask for.
     pub fn view_set(&self) -> Vec<View> {
-        views(self.views, self.azimuth_offset_deg)
+        views_at(&self.elevations_deg, self.views, self.azimuth_offset_deg)
     }
 }
 
@@ -86,7 +93,7 @@ pub fn evaluate(
     for (number, row) in rows.iter_mut().skip(1).enumerate() {
         row.level = number as u32 + 1;
         let own = settings.own_heights_px.get(number).copied().flatten();
-        if let Some(height_px) = own.or(settings.heights_px.first().copied()) {
+        if let Some(height_px) = own.or(settings.heights_px.iter().copied().max()) {
             row.distance_m = distance_m(original.0, height_px);
         }
     }
@@ -111,11 +118,49 @@ pub fn evaluate(
                 .push(measure(&reference, drawable, settings.client));
         }
     }
-    let levels = rows.split_off(1);
+    let mut measured = rows.split_off(1);
+    if settings.appearance {
+        add_appearance(original.0, levels, &heights, settings, &mut measured);
+    }
+    let levels = measured;
     Report {
         original: rows.pop(),
         levels,
         ..Report::default()
+    }
+}
+
+fn add_appearance(
+    original: &Model,
+    levels: &[(&Model, &str)],
+    heights_px: &[Vec<u32>],
+    settings: &Settings,
+    rows: &mut [Level],
+) {
+    // Where it is not known from where a level is shown, the first size stands for it.
+    let first = settings.heights_px.iter().copied().max();
+    let own = |i: usize| settings.own_heights_px.get(i).copied().flatten();
+    let starts: Vec<u32> = (0..levels.len()).filter_map(|i| own(i).or(first)).collect();
+    if starts.len() < levels.len() {
+        return;
+    }
+    let models: Vec<&Model> = levels.iter().map(|(model, _)| *model).collect();
+    let found = appearance(&Asked {
+        original,
+        levels: &models,
+        views: &settings.view_set(),
+        heights_px,
+        starts_px: &starts,
+    });
+    for (row, found) in rows.iter_mut().zip(found) {
+        for (height_px, figures) in found.sizes {
+            let size = row.sizes.iter_mut().find(|s| s.height_px == height_px);
+            if let Some(size) = size {
+                size.appearance = Some(Box::new(figures));
+            }
+        }
+        row.jump_to_next = found.jump;
+        row.orbit = found.orbit;
     }
 }
 

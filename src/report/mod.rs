@@ -3,15 +3,21 @@
 //! What is measured is what was written: files are loaded again and drawn over the original's
 //! pictures, supersampled and as an engine draws them.
 
+mod appearance;
 pub mod band;
 mod contact;
 mod cost;
 mod drawable;
 mod evaluate;
+mod flip;
 mod judge;
+mod lab;
 mod reference;
 pub mod schema;
+mod shot;
 mod silhouette;
+mod stage;
+mod start;
 
 pub use contact::contact_sheet;
 pub use cost::{draw_calls, texture_bytes};
@@ -20,3 +26,4 @@ pub use evaluate::{Settings, evaluate};
 pub use judge::{Judged, heights, judge};
 pub use reference::Reference;
 pub use silhouette::{Agreement, agreement};
+pub use start::start_height_px;

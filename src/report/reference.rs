@@ -178,6 +178,7 @@ impl Reference {
             area_ratio: Figure::ratio(over(|v| v.area_ratio)),
             half_area_ratio: Figure::ratio(over(|v| v.half_area_ratio)),
             client: None,
+            appearance: None,
             views,
         }
     }

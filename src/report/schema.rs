@@ -44,6 +44,14 @@ pub struct Level {
     pub overdraw: f64,
     /// Figures by size on the screen.
     pub sizes: Vec<SizeFigures>,
+    /// What the eye sees as a pop: this level against the next one, where the next one takes over;
+    /// absent for the last level, the original, and where colours were not measured.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub jump_to_next: Option<Jump>,
+    /// What moves from frame to frame as the camera orbits, at the level's own height; absent for
+    /// the original and where colours were not measured.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub orbit: Option<Orbit>,
 }
 
 /// How a level compares with the supersampled original at one size on the screen.
@@ -68,6 +76,10 @@ pub struct SizeFigures {
     /// the same supersampled original; only where it was asked for.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub client: Option<Box<SizeFigures>>,
+    /// Colours, distances and normals against the original's; absent where they were not measured
+    /// (in the report of a bake).
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub appearance: Option<Box<Appearance>>,
     /// The views, one by one.
     #[serde(skip_serializing_if = "Vec::is_empty", default)]
     pub views: Vec<ViewFigures>,
@@ -82,6 +94,9 @@ pub struct Figure {
     pub worst: f64,
     /// The worst view's name.
     pub worst_view: String,
+    /// Standard deviation over views.
+    #[serde(default)]
+    pub deviation: f64,
 }
 
 /// One view of a level.
@@ -99,6 +114,96 @@ pub struct ViewFigures {
     pub area_ratio: f64,
     /// Half-covered pixels over the original's.
     pub half_area_ratio: f64,
+}
+
+/// How a level looks beside the original: lit by sky and sun, before a ground of half of white's
+/// light, with at least 16 samples a pixel (4 where the tree is higher than 256 pixels). Means of FLIP, SSIM and PSNR are over the pixels that
+/// either one touches: an empty surrounding is no merit.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Appearance {
+    /// Harmonic mean of both below: `2 sum(min(a, b)) / (sum(a) + sum(b))` over the coverage `a` of
+    /// the original's and `b` of the level's pixels, 0 to 1.
+    pub soft_f1: Figure,
+    /// `sum(min(a, b)) / sum(b)`.
+    pub soft_precision: Figure,
+    /// `sum(min(a, b)) / sum(a)`.
+    pub soft_recall: Figure,
+    /// Pixels that differ by more than 8 of 255 in a channel of sRGB over those that the original
+    /// touches (Lee, section IV.A); above 1 where the level reaches far outside.
+    pub incorrect_share_8: Figure,
+    /// As above, more than 32 of 255.
+    pub incorrect_share_32: Figure,
+    /// Structural similarity of greys in windows of 11 pixels (Wang et al. 2004), up to 1.
+    pub ssim: Figure,
+    /// Peak signal-to-noise ratio of sRGB, decibel; 100 where nothing differs.
+    pub psnr_db: Figure,
+    /// FLIP (Andersson et al. 2020) at 67 pixels a degree, 0 (no difference) to 1.
+    pub flip: Figure,
+    /// Distance of the mean colours of what is covered, in CIE L*a*b* (delta E 1976): 2 is just
+    /// visible side by side.
+    pub color_shift_delta_e: Figure,
+    /// Mean difference of distances along the line of sight where both cover half a pixel, in tree
+    /// heights; null where there is no such pixel in any view.
+    pub depth_error: Option<Figure>,
+    /// Mean angle between normals there, degrees.
+    pub normal_error_deg: Option<Figure>,
+    /// The views, one by one.
+    pub views: Vec<ViewAppearance>,
+}
+
+/// One view of [`Appearance`]; the same keys.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[allow(missing_docs)]
+pub struct ViewAppearance {
+    pub view: String,
+    pub soft_f1: f64,
+    pub soft_precision: f64,
+    pub soft_recall: f64,
+    pub incorrect_share_8: f64,
+    pub incorrect_share_32: f64,
+    pub ssim: f64,
+    pub psnr_db: f64,
+    pub flip: f64,
+    pub color_shift_delta_e: f64,
+    pub depth_error: Option<f64>,
+    pub normal_error_deg: Option<f64>,
+}
+
+/// A level against the next one at the same size on the screen.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Jump {
+    /// Height of the tree in pixels where the next level takes over.
+    pub height_px: u32,
+    /// F1 of the two silhouettes at half coverage.
+    pub f1: Figure,
+    /// Covered area of the next level over that of this one.
+    pub area_ratio: Figure,
+    /// The next level against this one.
+    pub appearance: Appearance,
+}
+
+/// How much changes while the camera orbits by a small angle, from the level views (elevation 0).
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Orbit {
+    /// Height of the tree in pixels.
+    pub height_px: u32,
+    /// Angle of the orbit, degrees.
+    pub step_deg: f64,
+    /// The level from one frame to the next.
+    pub level: Change,
+    /// The original, at the same size: what there is to see without any level.
+    pub original: Change,
+}
+
+/// The difference of two frames of one model.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Change {
+    /// As in [`Appearance`].
+    pub flip: Figure,
+    /// As in [`Appearance`].
+    pub incorrect_share_32: Figure,
+    /// As in [`Appearance`].
+    pub psnr_db: Figure,
 }
 
 /// What sharing of self-similar sub-trees saves and costs.
@@ -150,22 +255,80 @@ impl Figure {
         Self::by(values, |value| value.min(1.0 / value))
     }
 
+    /// Mean and most of named values.
+    pub fn most<'a>(values: impl Iterator<Item = (&'a str, f64)>) -> Self {
+        Self::by(values, |value| -value)
+    }
+
     /// `goodness` grows with how good a value is; of equals the first view is named.
     fn by<'a>(values: impl Iterator<Item = (&'a str, f64)>, goodness: impl Fn(f64) -> f64) -> Self {
-        let (mut sum, mut count) = (0.0, 0u32);
+        let (mut sum, mut squares, mut count) = (0.0, 0.0, 0u32);
         let mut worst: Option<(&str, f64)> = None;
         for (view, value) in values {
             sum += value;
+            squares += value * value;
             count += 1;
             if worst.is_none_or(|(_, w)| goodness(value) < goodness(w)) {
                 worst = Some((view, value));
             }
         }
         let (view, worst) = worst.unwrap_or_default();
+        let mean = sum / count.max(1) as f64;
+        let variance = squares / count.max(1) as f64 - mean * mean;
         Self {
-            mean: sum / count.max(1) as f64,
+            mean,
             worst,
             worst_view: view.into(),
+            // Equal values leave a rounding error, not a spread.
+            deviation: if variance > 1e-15 {
+                variance.sqrt()
+            } else {
+                0.0
+            },
+        }
+    }
+}
+
+impl Appearance {
+    /// Means and worst views of single views.
+    pub fn over(views: Vec<ViewAppearance>) -> Self {
+        let of = |value: fn(&ViewAppearance) -> f64| {
+            views.iter().map(move |v| (v.view.as_str(), value(v)))
+        };
+        let inside = |value: fn(&ViewAppearance) -> Option<f64>| {
+            let found: Vec<_> = views
+                .iter()
+                .filter_map(|v| Some((v.view.as_str(), value(v)?)))
+                .collect();
+            (!found.is_empty()).then(|| Figure::most(found.into_iter()))
+        };
+        Self {
+            soft_f1: Figure::least(of(|v| v.soft_f1)),
+            soft_precision: Figure::least(of(|v| v.soft_precision)),
+            soft_recall: Figure::least(of(|v| v.soft_recall)),
+            incorrect_share_8: Figure::most(of(|v| v.incorrect_share_8)),
+            incorrect_share_32: Figure::most(of(|v| v.incorrect_share_32)),
+            ssim: Figure::least(of(|v| v.ssim)),
+            psnr_db: Figure::least(of(|v| v.psnr_db)),
+            flip: Figure::most(of(|v| v.flip)),
+            color_shift_delta_e: Figure::most(of(|v| v.color_shift_delta_e)),
+            depth_error: inside(|v| v.depth_error),
+            normal_error_deg: inside(|v| v.normal_error_deg),
+            views,
+        }
+    }
+}
+
+impl Change {
+    /// Means and worst views of single views.
+    pub fn over(views: &[ViewAppearance]) -> Self {
+        let of = |value: fn(&ViewAppearance) -> f64| {
+            views.iter().map(move |v| (v.view.as_str(), value(v)))
+        };
+        Self {
+            flip: Figure::most(of(|v| v.flip)),
+            incorrect_share_32: Figure::most(of(|v| v.incorrect_share_32)),
+            psnr_db: Figure::least(of(|v| v.psnr_db)),
         }
     }
 }

@@ -73,6 +73,11 @@ impl Agreement {
     }
 }
 
+/// `part / whole`, where a whole of nothing is all there.
+pub(super) fn share(part: f64, whole: f64) -> f64 {
+    if whole > 0.0 { part / whole } else { 1.0 }
+}
+
 /// `level / original`, with a floor of a hundredth of a pixel, so that nothing over nothing is 1
 /// and something over nothing is large but finite.
 pub(super) fn ratio(level: f64, original: f64) -> f64 {

@@ -4,8 +4,8 @@ use glam::Vec3;
 
 use super::raster::Camera;
 
-/// Elevations of the rings of views, degrees above the horizon.
-const ELEVATIONS: [f32; 3] = [0.0, 30.0, -15.0];
+/// Elevations of the rings of views where nothing else is asked for, degrees above the horizon.
+pub const ELEVATIONS: [f32; 3] = [0.0, 30.0, -15.0];
 
 /// Views that [`views`] gives where nothing else is asked for: five azimuths at three elevations
 /// and the top. An odd number of azimuths, since opposite views show mirrored silhouettes.
@@ -27,7 +27,13 @@ pub struct View {
 /// Another `offset_deg` (degrees of azimuth) gives another set, so that what was fitted to some
 /// views can be judged by others.
 pub fn views(count: usize, offset_deg: f32) -> Vec<View> {
-    let azimuths = count.saturating_sub(1).div_ceil(ELEVATIONS.len()).max(1);
+    views_at(&ELEVATIONS, count, offset_deg)
+}
+
+/// As [`views`], at other elevations (degrees above the horizon).
+pub fn views_at(elevations: &[f32], count: usize, offset_deg: f32) -> Vec<View> {
+    let rings = elevations.len().max(1);
+    let azimuths = count.saturating_sub(1).div_ceil(rings).max(1);
     let ring = |elevation_deg: f32| {
         (0..azimuths).map(move |i| {
             let azimuth_deg = (360.0 * i as f32 / azimuths as f32 + offset_deg).rem_euclid(360.0);
@@ -43,7 +49,12 @@ pub fn views(count: usize, offset_deg: f32) -> Vec<View> {
         azimuth_deg: offset_deg.rem_euclid(360.0),
         elevation_deg: 90.0,
     };
-    ELEVATIONS.into_iter().flat_map(ring).chain([top]).collect()
+    elevations
+        .iter()
+        .copied()
+        .flat_map(ring)
+        .chain([top])
+        .collect()
 }
 
 impl View {

@@ -19,7 +19,7 @@ pub enum Light {
 
 impl Light {
     /// Light that reaches a surface with this normal, as a factor on its base colour.
-    fn on(self, normal: Vec3) -> f32 {
+    pub(super) fn on(self, normal: Vec3) -> f32 {
         match self {
             Self::Unlit => 1.0,
             Self::Outdoors => {
@@ -50,13 +50,13 @@ pub fn srgb_from_linear(value: f32) -> f32 {
 }
 
 /// A triangle whose values are read at several samples.
-struct Surface<'a> {
+pub(super) struct Surface<'a> {
     fragment: Fragment<'a>,
     normal: Option<[Plane; 3]>,
     color: Option<[Plane; 3]>,
     q: Plane,
     /// Minus one where the back is seen: its normal points the other way.
-    side: f32,
+    pub side: f32,
 }
 
 impl Items {
@@ -127,7 +127,7 @@ impl Items {
 }
 
 impl<'a> Surface<'a> {
-    fn new(
+    pub fn new(
         scene: &Scene<'a>,
         corners: &[super::camera::Corner],
         id: u32,
@@ -161,7 +161,8 @@ impl<'a> Surface<'a> {
         })
     }
 
-    fn at(&self, x: i32, y: i32) -> ([f32; 3], Vec3) {
+    /// Linear base colour and unit normal at a sample.
+    pub fn at(&self, x: i32, y: i32) -> ([f32; 3], Vec3) {
         let q = self.q.value(x, y);
         let value = |planes: &[Plane; 3]| {
             Vec3::from_array(std::array::from_fn(|i| planes[i].value(x, y))) / q

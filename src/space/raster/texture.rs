@@ -290,7 +290,7 @@ fn fixed(coordinate: f32, size: u32) -> i32 {
 }
 
 impl Wrap {
-    fn apply(self, i: i32, size: u32) -> usize {
+    pub(super) fn apply(self, i: i32, size: u32) -> usize {
         let size = size as i32;
         let wrapped = match self {
             Self::Repeat => i.rem_euclid(size),

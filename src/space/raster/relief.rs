@@ -1,0 +1,113 @@
+//! Normal maps: which way a surface looks within a triangle.
+
+use glam::{Vec2, Vec3};
+
+use super::Scene;
+use super::camera::Corner;
+use super::texture::Wrap;
+use super::triangle::{Plane, Triangle};
+
+/// A material's normal map (glTF: tangent space, x to the right and y to the top of the image).
+#[derive(Clone, Copy, Debug)]
+pub struct Relief<'a> {
+    /// Straight RGBA, rows from the top.
+    pub rgba: &'a [u8],
+    /// Width in texels.
+    pub width: u32,
+    /// Height in texels.
+    pub height: u32,
+    /// What happens outside 0..1 along u and v.
+    pub wrap: [Wrap; 2],
+    /// Which set of texture coordinates addresses it: 0 or 1.
+    pub uv_set: u8,
+    /// Scale of x and y.
+    pub scale: f32,
+}
+
+/// The normal map on one triangle.
+pub(super) struct Bumps<'a> {
+    relief: &'a Relief<'a>,
+    u: Plane,
+    v: Plane,
+    q: Plane,
+    /// Where u grows, in model space.
+    along: Vec3,
+    /// Where v falls: the image's top.
+    up: Vec3,
+}
+
+impl<'a> Bumps<'a> {
+    /// `None` where texture coordinates don't vary over the triangle.
+    pub fn new(
+        relief: &'a Relief<'a>,
+        scene: &Scene,
+        indices: &[u32; 3],
+        corners: [Corner; 3],
+        triangle: &Triangle,
+    ) -> Option<Self> {
+        let uvs = scene.geometry.uvs[relief.uv_set.min(1) as usize];
+        if uvs.is_empty() {
+            return None;
+        }
+        let [a, b, c] = indices.map(|i| i as usize);
+        let (s, t) = (uvs[b] - uvs[a], uvs[c] - uvs[a]);
+        let turn = s.perp_dot(t);
+        if turn == 0.0 {
+            return None;
+        }
+        let positions = scene.geometry.positions;
+        let (p, r) = (positions[b] - positions[a], positions[c] - positions[a]);
+        let q = corners.map(|c| c.q);
+        let over = |axis: usize| {
+            triangle.plane(std::array::from_fn(|i| {
+                uvs[indices[i] as usize][axis] * q[i]
+            }))
+        };
+        Some(Self {
+            relief,
+            u: over(0),
+            v: over(1),
+            q: triangle.plane(q),
+            along: (p * t.y - r * s.y) * turn.signum(),
+            up: (p * t.x - r * s.x) * turn.signum(),
+        })
+    }
+
+    /// The mapped normal at a sample, where `normal` is the unit normal of the triangle's front.
+    pub fn at(&self, x: i32, y: i32, normal: Vec3) -> Vec3 {
+        let q = self.q.value(x, y);
+        let uv = Vec2::new(self.u.value(x, y), self.v.value(x, y)) / q;
+        let [r, g, b] = self.relief.texel(uv);
+        let tangent = (self.along - normal * normal.dot(self.along)).normalize_or_zero();
+        let mut bitangent = normal.cross(tangent);
+        if bitangent.dot(self.up) < 0.0 {
+            bitangent = -bitangent;
+        }
+        let scale = self.relief.scale;
+        (tangent * (r * scale) + bitangent * (g * scale) + normal * b).normalize_or(normal)
+    }
+}
+
+impl Relief<'_> {
+    /// The base level, bilinear; each channel from -1 to 1.
+    fn texel(&self, uv: Vec2) -> [f32; 3] {
+        let place = |coordinate: f32, size: u32, wrap: Wrap| {
+            let at = (coordinate * size as f32 - 0.5).clamp(-1e9, 1e9);
+            let low = at.floor();
+            let texels = [0, 1].map(|step| wrap.apply(low as i32 + step, size));
+            (texels, at - low)
+        };
+        let (columns, right) = place(uv.x, self.width, self.wrap[0]);
+        let (rows, below) = place(uv.y, self.height, self.wrap[1]);
+        let value = |row: usize, column: usize, channel: usize| {
+            f32::from(self.rgba[(row * self.width as usize + column) * 4 + channel])
+        };
+        std::array::from_fn(|channel| {
+            let [top, bottom] = rows.map(|row| {
+                let [a, b] = columns.map(|column| value(row, column, channel));
+                a + (b - a) * right
+            });
+            (top + (bottom - top) * below) / 127.5 - 1.0
+        })
+    }
+}
