@@ -46,6 +46,8 @@ pub mod space;
 #[cfg(feature = "bake")]
 pub mod study;
 #[cfg(feature = "bake")]
+pub mod sweep;
+#[cfg(feature = "bake")]
 pub mod watch;
 
 #[cfg(feature = "bake")]

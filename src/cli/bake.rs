@@ -146,7 +146,7 @@ fn pixels(text: &str) -> std::result::Result<f64, String> {
     }
 }
 
-fn limit(text: &str) -> std::result::Result<Limit, String> {
+pub(super) fn limit(text: &str) -> std::result::Result<Limit, String> {
     let wrong = || "write a count such as 5000 or a share such as 10%".to_string();
     if let Some(share) = text.trim().strip_suffix('%') {
         let share: f64 = share.trim().parse().map_err(|_| wrong())?;

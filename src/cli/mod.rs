@@ -7,6 +7,7 @@ mod grow;
 mod inspect;
 mod progress;
 mod study;
+mod sweep;
 
 use std::ffi::OsString;
 use std::process::ExitCode;
@@ -26,6 +27,7 @@ enum Command {
     Evaluate(evaluate::Args),
     Grow(grow::GrowArgs),
     Inspect(inspect::InspectArgs),
+    Sweep(sweep::Args),
     Study(study::StudyArgs),
 }
 
@@ -43,6 +45,7 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         Command::Evaluate(args) => evaluate::run(&args),
         Command::Grow(args) => grow::run(&args),
         Command::Inspect(args) => inspect::run(&args),
+        Command::Sweep(args) => sweep::run(&args),
         Command::Study(args) => study::run(&args),
     };
     match result {
