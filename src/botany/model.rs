@@ -2,6 +2,10 @@
 
 use glam::{DVec3, Vec2, Vec3};
 
+/// The least height that sizes on the screen are stated by, normalised units: a picture of a carpet
+/// at a height of 512 pixels would be as wide as its width is over its height.
+const FLATTEST: f32 = 0.5;
+
 /// A polygonal model in normalised space: centre at the origin, bounding-sphere radius one, y up.
 ///
 /// The loader has already resolved or rejected every trouble of the file: all indices are in
@@ -208,7 +212,8 @@ impl Model {
         }
     }
 
-    /// Height of the tree (extent along y) in normalised units.
+    /// Height of the tree (extent along y) in normalised units; a quarter of the diameter for what
+    /// is flatter than that, such as leaves on the ground: sizes on the screen are stated by it.
     pub fn height(&self) -> f32 {
         let (mut low, mut high) = (f32::MAX, f32::MIN);
         for triangle in &self.triangles {
@@ -217,6 +222,6 @@ impl Model {
                 (low, high) = (low.min(y), high.max(y));
             }
         }
-        if low <= high { high - low } else { 0.0 }
+        (high - low).max(FLATTEST)
     }
 }

@@ -88,22 +88,35 @@ fn write(folder: &Path, name: &str, text: &str) -> Result<()> {
     std::fs::write(&file, text).map_err(|e| Error::io(&file, "write", e))
 }
 
-/// One line a run, the fastest first; a star for those on the front.
+/// One line a run, the fastest first; a star for those on the front. `ratio` and `cpu`: time, and
+/// processor time of all threads, over those of the base.
 fn table(found: &Sweep) -> String {
     let mut out = format!(
-        "{:<20}{:>9}{:>7}{:>9}{:>9}{:>9}{:>8}{:>8}{:>7}{:>7}  front\n",
-        "variant", "seconds", "ratio", "peak MB", "disk MB", "tex MB", "F1", "worst", "E", "area"
+        "{:<20}{:>9}{:>7}{:>7}{:>9}{:>9}{:>9}{:>8}{:>8}{:>7}{:>7}  front\n",
+        "variant",
+        "seconds",
+        "ratio",
+        "cpu",
+        "peak MB",
+        "disk MB",
+        "tex MB",
+        "F1",
+        "worst",
+        "E",
+        "area"
     );
     let mib = |bytes: u64| bytes as f64 / 1_048_576.0;
     let base = found.runs.first().map_or(1.0, |r| r.seconds);
+    let base_cpu = found.runs.first().map_or(1.0, |r| r.cpu_seconds);
     let mut runs: Vec<_> = found.runs.iter().collect();
     runs.sort_by(|a, b| a.seconds.total_cmp(&b.seconds));
     for run in runs {
         let line = format!(
-            "{:<20}{:>9.1}{:>7.2}{:>9.0}{:>9.1}{:>9.1}{:>8.4}{:>8.4}{:>7.2}{:>7.3}  {}",
+            "{:<20}{:>9.1}{:>7.2}{:>7.2}{:>9.0}{:>9.1}{:>9.1}{:>8.4}{:>8.4}{:>7.2}{:>7.3}  {}",
             run.name,
             run.seconds,
             run.seconds / base.max(1e-9),
+            run.cpu_seconds / base_cpu.max(1e-9),
             mib(run.peak_bytes),
             mib(run.package_bytes),
             mib(run.texture_bytes),

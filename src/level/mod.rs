@@ -19,7 +19,7 @@ use crate::error::Result;
 use crate::export::chart::Chart;
 use crate::export::matching::Matched;
 use crate::export::original::Original;
-use crate::export::surface::Scene;
+use crate::export::surface::{Scene, scene_of_model};
 use crate::recipe::{Billboard, Method, Recipe};
 use crate::watch::{Watch, part};
 
@@ -91,6 +91,9 @@ impl Baker<'_> {
             let plan = crossed_quads(&self.tree.model, self.elements, count);
             return Ok(self.fit(plan, request, watch)?.level());
         }
+        if request.triangles >= self.tree.model.triangles.len() as u64 {
+            return Ok(self.original_itself());
+        }
         let Some(plan) = self.cut(request) else {
             let plan = whole_tree(
                 &self.tree.model,
@@ -114,6 +117,18 @@ impl Baker<'_> {
                 Ok(if better { other } else { made }.level())
             }
             None => Ok(made.level()),
+        }
+    }
+
+    /// The level of a tree that fits into its budget as it is: nothing is nearer.
+    fn original_itself(&self) -> Level {
+        let model = &self.tree.model;
+        Level {
+            scene: scene_of_model(model, 0..model.triangles.len() as u32),
+            plan: LevelPlan::default(),
+            matched: Matched::default(),
+            charts: Vec::new(),
+            atlas: [0; 2],
         }
     }
 

@@ -33,6 +33,10 @@ struct Picture {
 /// Pictures are drawn for sizes down to this many halvings.
 const MOST_HALVINGS: u32 = 5;
 
+/// Share of the mean covered area under which a view of the original is edge-on (a flat hedge from
+/// its side, an open trunk from above): a ratio of areas is nothing there, so both are topped up.
+const EDGE_ON: f64 = 0.05;
+
 /// The least error by which shift ratios divide: a tree too coarse to notice half a pixel.
 const LEAST_SHIFT_ERROR: f64 = 1e-4;
 
@@ -161,7 +165,9 @@ impl Reference {
     }
 
     fn compare_pictures(&self, draw: impl Fn(&Camera) -> Coverage + Sync) -> SizeFigures {
-        let figures = |picture: &Picture| picture.figures(&draw(&picture.camera));
+        let all: f64 = self.pictures.iter().map(|p| p.original.area()).sum();
+        let least = EDGE_ON * all / self.pictures.len().max(1) as f64;
+        let figures = |picture: &Picture| picture.figures(&draw(&picture.camera), least);
         self.summary(self.pictures.par_iter().map(figures).collect())
     }
 
@@ -207,14 +213,15 @@ impl Picture {
         (picture, 0.5 * (moved[0] + moved[1]))
     }
 
-    fn figures(&self, level: &Coverage) -> ViewFigures {
+    fn figures(&self, level: &Coverage, least: f64) -> ViewFigures {
+        let more = (least - self.original.area()).max(0.0);
         let found: Agreement = agreement(&self.original, level);
         ViewFigures {
             view: self.view.name.clone(),
             f1: found.f1(),
             precision: found.precision(),
             recall: found.recall(),
-            area_ratio: ratio(level.area(), self.original.area()),
+            area_ratio: ratio(level.area() + more, self.original.area() + more),
             half_area_ratio: found.pixel_ratio(),
         }
     }

@@ -68,7 +68,8 @@ pub struct SizeFigures {
     pub precision: Figure,
     /// Share of the original's pixels that the level has.
     pub recall: Figure,
-    /// Covered area of the level over that of the original, from coverage fractions.
+    /// Covered area of the level over that of the original, from coverage fractions. Where a view
+    /// shows the original edge-on, both are topped up to a twentieth of its mean area.
     pub area_ratio: Figure,
     /// The same from pixels that are at least half covered.
     pub half_area_ratio: Figure,

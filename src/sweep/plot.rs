@@ -71,22 +71,46 @@ pub fn plot(sweep: &Sweep) -> String {
         );
     }
     out += &format!(
-        "<text x=\"{}\" y=\"{}\">seconds</text><text x=\"8\" y=\"22\">1 - F1, mean over levels</text>\n",
-        WIDTH - MARGIN[2] + 8.0,
-        HEIGHT - MARGIN[3] + 18.0
+        "<text x=\"{}\" y=\"{}\" text-anchor=\"end\">seconds</text><text x=\"8\" y=\"22\">1 - F1, mean over levels</text>\n",
+        WIDTH - MARGIN[2],
+        HEIGHT - MARGIN[3] + 36.0
     );
     out += &front(&axes, &sweep.runs);
-    for run in &sweep.runs {
+    for (run, label_y) in sweep.runs.iter().zip(label_heights(&axes, &sweep.runs)) {
         let (x, y) = (axes.x(run.seconds), axes.y(1.0 - run.f1_mean));
         let class = if run.on_front { "p f" } else { "p" };
         out += &format!(
             "<circle class=\"{class}\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"4\"/><text x=\"{:.1}\" y=\"{:.1}\">{}</text>\n",
             x + 7.0,
-            y + 4.0,
+            label_y + 4.0,
             escape(&run.name)
         );
     }
     out + "</svg>\n"
+}
+
+/// Where names stand so that none covers another: moved down past those they would touch.
+fn label_heights(axes: &Axes, runs: &[Run]) -> Vec<f64> {
+    let mut order: Vec<usize> = (0..runs.len()).collect();
+    let y = |i: usize| axes.y(1.0 - runs[i].f1_mean);
+    order.sort_by(|&a, &b| y(a).total_cmp(&y(b)));
+    // Left end, right end (about seven units a letter) and height of every name so far.
+    let mut placed: Vec<[f64; 3]> = Vec::new();
+    let mut out = vec![0.0; runs.len()];
+    for i in order {
+        let left = axes.x(runs[i].seconds);
+        let right = left + 14.0 + 7.0 * runs[i].name.len() as f64;
+        let mut at = y(i);
+        while let Some(other) = placed
+            .iter()
+            .find(|p| p[0] < right && left < p[1] && (p[2] - at).abs() < 13.0)
+        {
+            at = other[2] + 13.0;
+        }
+        placed.push([left, right, at]);
+        out[i] = at;
+    }
+    out
 }
 
 fn front(axes: &Axes, runs: &[Run]) -> String {

@@ -32,10 +32,10 @@ pub fn variants() -> Vec<Variant> {
             out.push(Variant { name, recipe });
         }
     };
-    for n in [1, 2, 6] {
+    for n in [1, 2, 3, 4, 6] {
         alone(format!("samples {n}"), &|r| r.samples = n);
     }
-    for n in [0, 2, 12] {
+    for n in [0, 2, 3, 6, 12] {
         alone(format!("refine_rounds {n}"), &|r| r.refine_rounds = n);
     }
     for n in [8, 12, 48] {

@@ -7,8 +7,6 @@
 const SHIFT: u32 = 2;
 /// Edge of a block in texels.
 pub(super) const BLOCK: i32 = 1 << SHIFT;
-/// Smaller images fit into the cache themselves.
-const LEAST_TEXELS: usize = 4096;
 /// No single alpha.
 const MIXED: u16 = 256;
 
@@ -20,11 +18,8 @@ pub(super) struct Blocks {
 }
 
 impl Blocks {
-    /// Looks for blocks of one alpha; empty for small images.
+    /// Looks for blocks of one alpha.
     pub fn new(width: u32, height: u32, alpha: &[u8]) -> Self {
-        if alpha.len() < LEAST_TEXELS {
-            return Self::default();
-        }
         let (width, height) = (width as usize, height as usize);
         let (across, down) = (width.div_ceil(1 << SHIFT), height.div_ceil(1 << SHIFT));
         let mut blocks = Vec::with_capacity(across * down);

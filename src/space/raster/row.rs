@@ -14,6 +14,16 @@ pub(super) struct TexelRow<'a> {
     pub address: Address,
 }
 
+/// How many samples from the first one on are known to be hit: inside a crown most are, and eight
+/// are passed over at a time.
+#[inline]
+fn hit_from(samples: &[u8]) -> usize {
+    let (words, rest) = samples.as_chunks::<8>();
+    let full = words.iter().take_while(|&&word| word == [1; 8]).count();
+    let next = words.get(full).map_or(rest, |word| word.as_slice());
+    8 * full + next.iter().take_while(|&&s| s == 1).count()
+}
+
 /// Rounding of positions may move a sample by less than this part of a step.
 const SLACK: f32 = 0.05;
 
@@ -30,7 +40,7 @@ impl TexelRow<'_> {
         let mut i = 0;
         while i < samples.len() {
             if samples[i] != 0 {
-                i += 1;
+                i += hit_from(&samples[i..]);
                 continue;
             }
             let x = from + i as i32;

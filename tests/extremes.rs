@@ -1,0 +1,185 @@
+//! Trees at the ends of the range: what nobody would call a tree still becomes a package.
+
+use std::path::Path;
+use std::process::Command;
+
+use glam::Vec3;
+use pleach::report::schema::Report;
+use pleach::space::glb::GlbBuilder;
+use serde_json::json;
+
+/// Positions and triangles of one material.
+type Part = (Vec<Vec3>, Vec<[u32; 3]>);
+
+fn random(i: u32, k: u32) -> f32 {
+    ((i * 7919 + k * 104_729) as f32 * 0.618_034).fract() - 0.5
+}
+
+/// Square leaves of an edge around `center`, spanned by two axes each.
+fn leaves(count: u32, edge: f32, center: impl Fn(u32) -> Vec3, flat: bool) -> Part {
+    let (mut points, mut triangles) = (Vec::new(), Vec::new());
+    for i in 0..count {
+        let some = |k| Vec3::new(random(i, k), random(i, k + 1), random(i, k + 2));
+        let (u, v) = match flat {
+            true => (Vec3::X, Vec3::Y),
+            false => (some(4).normalize_or(Vec3::X), some(7).normalize_or(Vec3::Y)),
+        };
+        let (u, v) = (u * edge / 2.0, v * edge / 2.0);
+        let (c, at) = (center(i), points.len() as u32);
+        points.extend([c - u - v, c + u - v, c + u + v, c - u + v]);
+        triangles.extend([[at, at + 1, at + 2], [at, at + 2, at + 3]]);
+    }
+    (points, triangles)
+}
+
+/// Rings of eight corners along `path`, each in the plane of `axes`; joined to a ring if `closed`.
+fn tube(path: &[(Vec3, [Vec3; 2])], closed: bool) -> Part {
+    let (mut points, mut triangles) = (Vec::new(), Vec::new());
+    for (center, [a, b]) in path {
+        points.extend((0..8).map(|s| {
+            let angle = s as f32 * std::f32::consts::FRAC_PI_4;
+            *center + (*a * angle.cos() + *b * angle.sin()) * 0.15
+        }));
+    }
+    let rings = path.len() as u32;
+    for ring in 0..if closed { rings } else { rings - 1 } {
+        for side in 0..8 {
+            let next = (ring + 1) % rings;
+            let [a, b] = [side, (side + 1) % 8].map(|s| ring * 8 + s);
+            let [c, d] = [side, (side + 1) % 8].map(|s| next * 8 + s);
+            triangles.extend([[a, c, b], [b, c, d]]);
+        }
+    }
+    (points, triangles)
+}
+
+fn trunk() -> Part {
+    let ring = |i: u8| (Vec3::Y * 0.5 * f32::from(i), [Vec3::Z, Vec3::X]);
+    tube(&(0..8).map(ring).collect::<Vec<_>>(), false)
+}
+
+fn ring() -> Part {
+    let at = |i: u8| {
+        let angle = f32::from(i) / 24.0 * std::f32::consts::TAU;
+        let out = Vec3::new(angle.cos(), angle.sin(), 0.0);
+        (Vec3::Y * 2.5 + out * 2.0, [out, Vec3::Z])
+    };
+    tube(&(0..24).map(at).collect::<Vec<_>>(), true)
+}
+
+fn ball(i: u32) -> Vec3 {
+    Vec3::new(random(i, 1), random(i, 2) + 1.4, random(i, 3)) * 2.5
+}
+
+fn write(file: &Path, parts: &[(&str, Part)]) {
+    let mut glb = GlbBuilder::default();
+    let primitives: Vec<_> = parts
+        .iter()
+        .enumerate()
+        .map(|(i, (_, (points, triangles)))| {
+            let position = glb.positions(points);
+            let indices = glb.indices(triangles, points.len());
+            json!({ "attributes": { "POSITION": position }, "indices": indices, "material": i })
+        })
+        .collect();
+    let materials: Vec<_> = parts
+        .iter()
+        .map(|(name, _)| json!({ "name": name, "doubleSided": true }))
+        .collect();
+    let root = json!({
+        "asset": { "version": "2.0" }, "scene": 0, "scenes": [{ "nodes": [0] }],
+        "nodes": [{ "mesh": 0 }], "meshes": [{ "primitives": primitives }],
+        "materials": materials,
+    });
+    std::fs::write(file, glb.finish(root)).unwrap();
+}
+
+/// Bakes two levels for a small screen, and reads the report.
+fn bake(parts: &[(&str, Part)], more: &[&str]) -> Report {
+    let home = tempfile::tempdir().unwrap();
+    write(&home.path().join("t.glb"), parts);
+    std::fs::write(home.path().join("s.ron"), "(first_height_px: 64)").unwrap();
+    let done = Command::new(env!("CARGO_BIN_EXE_pleach"))
+        .args(["bake", "t.glb", "-o", "out", "--preset", "draft", "--json"])
+        .args(["--scene", "s.ron"])
+        .args(more)
+        .current_dir(home.path())
+        .output()
+        .unwrap();
+    let message = String::from_utf8_lossy(&done.stderr).into_owned();
+    assert!(done.status.success(), "{message}");
+    assert!(home.path().join("out/t_LOD1.glb").is_file());
+    serde_json::from_slice(&done.stdout).unwrap()
+}
+
+#[test]
+fn one_leaf_and_two_are_their_own_levels() {
+    for count in [1, 2] {
+        let report = bake(&[("leaf", leaves(count, 0.2, ball, false))], &[]);
+        for level in &report.levels {
+            assert_eq!(level.triangles, 2 * u64::from(count));
+        }
+        let nearest = &report.levels[0].sizes[0];
+        assert!((nearest.area_ratio.worst - 1.0).abs() < 0.02);
+    }
+}
+
+#[test]
+fn leaves_in_a_plane_on_a_line_and_far_from_their_trunk_are_baked() {
+    let plane = |i| Vec3::new(random(i, 1) * 2.0, random(i, 2) * 2.0, 0.0);
+    let line = |i: u32| Vec3::Y * 0.01 * i as f32;
+    let ground = |i| Vec3::new(random(i, 1) * 16.0, 0.01, random(i, 2) * 16.0);
+    let cases = [
+        ("plane", vec![("leaf", leaves(200, 0.2, plane, true))]),
+        ("line", vec![("leaf", leaves(200, 0.4, line, false))]),
+        (
+            "ground",
+            vec![("bark", trunk()), ("leaf", leaves(100, 0.2, ground, false))],
+        ),
+    ];
+    for (name, parts) in cases {
+        let report = bake(&parts, &["--triangles", "20%,24"]);
+        let f1: Vec<f64> = report.levels.iter().map(|l| l.sizes[0].f1.mean).collect();
+        assert!(f1.len() == 2 && f1[0] > 0.7, "{name}: {f1:?}");
+    }
+}
+
+#[test]
+fn wood_or_foliage_alone_and_a_ring_of_wood_are_baked() {
+    let cases = [
+        ("trunk", vec![("bark", trunk())]),
+        ("foliage", vec![("leaf", leaves(300, 0.3, ball, false))]),
+        (
+            "ring",
+            vec![("bark", ring()), ("leaf", leaves(100, 0.2, ball, false))],
+        ),
+    ];
+    for (name, parts) in cases {
+        let report = bake(&parts, &["--triangles", "50%,24"]);
+        let f1: Vec<f64> = report.levels.iter().map(|l| l.sizes[0].f1.mean).collect();
+        assert!(f1.len() == 2 && f1[0] > 0.8, "{name}: {f1:?}");
+    }
+}
+
+#[test]
+fn slivers_are_baked_and_a_budget_beyond_the_tree_is_the_tree() {
+    let mut slivers = (Vec::new(), Vec::new());
+    for i in 0..200u32 {
+        let y = i as f32 * 0.01;
+        slivers
+            .0
+            .extend([Vec3::new(0.0, y, 0.0), Vec3::new(1.0, y, 0.0)]);
+        slivers.0.push(Vec3::new(0.5, y + 1e-5, 0.0));
+        slivers.1.push([3 * i, 3 * i + 1, 3 * i + 2]);
+    }
+    let report = bake(
+        &[("bark", trunk()), ("leaf", slivers)],
+        &["--triangles", "24"],
+    );
+    assert!(report.levels[0].triangles <= 24);
+    let parts = [("bark", trunk()), ("leaf", leaves(50, 0.3, ball, false))];
+    let report = bake(&parts, &["--triangles", "9000,100%,24"]);
+    let triangles: Vec<u64> = report.levels.iter().map(|l| l.triangles).collect();
+    assert_eq!(triangles[..2], [112 + 100; 2]);
+    assert!((report.levels[0].sizes[0].area_ratio.worst - 1.0).abs() < 0.01);
+}
