@@ -3,14 +3,15 @@
 use glam::Vec3;
 
 use crate::botany::model::Frame;
-use crate::botany::tree::{NO_NODE, Organ, Tree};
+use crate::botany::tree::{self, NO_NODE, Organ, Tree};
 use crate::cloud::coverage::{coverage, epsilon};
 use crate::cloud::foliage::{Face, Foliage};
 use crate::cloud::occlusion::Occlusion;
 use crate::detail::element::Element;
+use crate::detail::optimal_distance::{Aspect, Own, aspects};
 use crate::export::chart::Chart;
 use crate::export::foliage::CardGroup;
-use crate::export::manifest::{Card, Level, Original, Range, Subtree};
+use crate::export::manifest::{self, Card, Level, Original, Range, Subtree};
 use crate::level;
 use crate::scene::Scene;
 
@@ -64,15 +65,34 @@ impl<'a> Describer<'a> {
     /// The hierarchy.
     pub fn subtrees(&self) -> Vec<Subtree> {
         let frame = &self.tree.model.frame;
-        let describe = |s: &crate::botany::tree::Subtree| Subtree {
+        let metres = |length: f32| (f64::from(length) * frame.radius) as f32;
+        let own = |own: Own| manifest::Own {
+            center: world(frame, own.sphere.0),
+            radius_m: metres(own.sphere.1),
+            optimal_distance_m: metres(own.optimal_distance),
+            geometric_distance_m: metres(own.geometric_distance),
+        };
+        let describe = |(s, aspect): (&tree::Subtree, Aspect)| Subtree {
             parent: s.parent,
+            children: s.children.clone(),
             order: s.order,
             connector: world(frame, s.connector),
             center: world(frame, s.sphere.0),
-            radius_m: (f64::from(s.sphere.1) * frame.radius) as f32,
+            radius_m: metres(s.sphere.1),
             leaves: s.leaf_count,
+            optimal_distance_m: metres(aspect.optimal_distance),
+            geometric_distance_m: metres(aspect.geometric_distance),
+            branch: aspect.branch.to_array(),
+            density: aspect.density,
+            own: aspect.own.map(own),
         };
-        self.tree.subtrees.iter().map(describe).collect()
+        let aspects = aspects(self.tree, self.scene.focal_px());
+        self.tree
+            .subtrees
+            .iter()
+            .zip(aspects)
+            .map(describe)
+            .collect()
     }
 
     /// Root of the mean squared error of a level, metres.

@@ -11,6 +11,7 @@ use crate::botany::tree::Tree;
 use crate::describe::{Describer, trunk};
 use crate::detail::element::elements;
 use crate::detail::merge::merge;
+use crate::detail::optimal_distance::TEXELS;
 use crate::detail::wood::Wood;
 use crate::error::{Error, Result};
 use crate::export::combined::{Packed, extras, write_combined};
@@ -190,6 +191,7 @@ fn levels(
         },
         scene: request.scene.clone(),
         tree: describer.original(),
+        subtree_texels: TEXELS,
         subtrees: describer.subtrees(),
         ..Manifest::default()
     };

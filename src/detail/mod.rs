@@ -7,6 +7,7 @@ pub mod level;
 pub mod merge;
 pub mod opaque;
 pub mod optimal_cut;
+pub mod optimal_distance;
 pub mod reassign;
 pub mod whole_tree;
 pub mod wood;

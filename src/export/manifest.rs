@@ -6,10 +6,12 @@
 
 use std::path::Path;
 
+use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
 use crate::recipe::Recipe;
+use crate::runtime::{self, Hierarchy, OwnLeaves};
 use crate::scene::Scene;
 
 /// What a manifest's name ends with.
@@ -17,7 +19,7 @@ pub const SUFFIX: &str = ".pleach.ron";
 /// What [`Manifest::format`] says.
 pub const FORMAT: &str = "pleach";
 /// Version of this form.
-pub const VERSION: u32 = 1;
+pub const VERSION: u32 = 2;
 
 /// The whole manifest.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -38,6 +40,8 @@ pub struct Manifest {
     pub tree: Original,
     /// The levels, nearest first; level 0 is the original.
     pub levels: Vec<Level>,
+    /// Texels along a sub-tree's texture, for which optimal distances are stated.
+    pub subtree_texels: u32,
     /// The hierarchy of sub-trees: parents before children; 0 is the whole tree.
     pub subtrees: Vec<Subtree>,
 }
@@ -157,11 +161,14 @@ pub struct Card {
     pub optimal_distance_m: f64,
 }
 
-/// One sub-tree.
+/// One sub-tree. [`Manifest::hierarchy`] makes of all of them what cuts are made through.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Subtree {
-    /// The sub-tree that carries it.
+    /// The sub-tree that carries it: an index into [`Manifest::subtrees`], smaller than its own.
+    /// `None` for the whole tree alone.
     pub parent: Option<u32>,
+    /// The sub-trees that it carries, ascending.
+    pub children: Vec<u32>,
     /// Branch order: 0 for a trunk.
     pub order: u32,
     /// Where it is connected.
@@ -172,6 +179,32 @@ pub struct Subtree {
     pub radius_m: f32,
     /// Leaves on it and all that it carries.
     pub leaves: u32,
+    /// Distance from which it may be drawn as a whole by a texture of [`Manifest::subtree_texels`]: there
+    /// one texel is one pixel. `extent * focal_px / texels`, the sphere's diameter for the extent.
+    pub optimal_distance_m: f32,
+    /// Distance at which its surface is one pixel off (root mean square) from the plane through it.
+    pub geometric_distance_m: f32,
+    /// Unit direction of the order-1 branch that carries it, from that branch's connector to its
+    /// middle; zeros for the trunk and the whole tree.
+    pub branch: [f32; 3],
+    /// Density of that branch's siblings, 0 (alone) to 1 (what is behind them is hidden).
+    pub density: f32,
+    /// What grows on its own branch, leaves and wood; `None` where it carries no other branches:
+    /// then that is all of it.
+    pub own: Option<Own>,
+}
+
+/// What grows on a sub-tree's own branch.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Own {
+    /// Centre of its bounding sphere.
+    pub center: [f32; 3],
+    /// Radius of its bounding sphere.
+    pub radius_m: f32,
+    /// As [`Subtree::optimal_distance_m`]; nearer than this, geometry stands for it.
+    pub optimal_distance_m: f32,
+    /// As [`Subtree::geometric_distance_m`].
+    pub geometric_distance_m: f32,
 }
 
 impl Manifest {
@@ -194,22 +227,63 @@ impl Manifest {
     /// Reads a manifest's text.
     ///
     /// # Errors
-    /// [`Error::Input`] with line and column, or where the version is unknown.
+    /// [`Error::Input`] with line and column where the text is no manifest (cut off, a key missing), with
+    /// the version where that is another one, and with the field where a number is not finite or a
+    /// sub-tree is missing.
     pub fn from_ron(text: &str, file: &Path) -> Result<Self> {
+        #[derive(Deserialize)]
+        struct Header {
+            format: String,
+            version: u32,
+        }
         let fail =
             |place: String, what: String| Error::input(file, place, what, "bake the package again");
-        let read: Self = ron::from_str(text).map_err(|e| {
+        let syntax = |e: ron::error::SpannedError| {
             let at = e.span.start;
-            fail(
-                format!("line {}, column {}", at.line, at.col),
-                e.code.to_string(),
-            )
-        })?;
-        if read.format != FORMAT || read.version != VERSION {
-            let what = format!("this is {:?} version {}", read.format, read.version);
-            return Err(fail("format".into(), what));
+            let place = format!("line {}, column {}", at.line, at.col);
+            fail(place, e.code.to_string())
+        };
+        // Another version may lack keys: it is told from the header, before anything else is read.
+        let header: Header = ron::from_str(text).map_err(syntax)?;
+        if header.format != FORMAT || header.version != VERSION {
+            let what = format!(
+                "this is {:?} version {}, not {FORMAT:?} version {VERSION}",
+                header.format, header.version
+            );
+            return Err(fail("version".into(), what));
         }
-        Ok(read)
+        let read: Self = ron::from_str(text).map_err(syntax)?;
+        match super::manifest_check::flaw(&read) {
+            Some((place, what)) => Err(fail(place, what)),
+            None => Ok(read),
+        }
+    }
+
+    /// The sub-trees in the form that cuts are made through: they switch at their optimal distances.
+    ///
+    /// # Errors
+    /// [`Error::Internal`]: what [`Manifest::from_ron`] has read has no flaw.
+    pub fn hierarchy(&self) -> Result<Hierarchy> {
+        let own = |o: &Own| OwnLeaves {
+            center: Vec3::from_array(o.center),
+            radius: o.radius_m,
+            switch_distance: o.optimal_distance_m,
+        };
+        let subtree = |s: &Subtree| runtime::Subtree {
+            parent: s.parent,
+            center: Vec3::from_array(s.center),
+            radius: s.radius_m,
+            leaves: s.leaves,
+            switch_distance: s.optimal_distance_m,
+            branch: Vec3::from_array(s.branch),
+            density: s.density,
+            own: s.own.as_ref().map(own),
+        };
+        let list: Vec<runtime::Subtree> = self.subtrees.iter().map(subtree).collect();
+        Hierarchy::new(&list).map_err(|flaw| Error::Internal {
+            step: "order sub-trees",
+            what: flaw.to_string(),
+        })
     }
 
     /// The files that a manifest of any version lists; `None` where it is none of ours.

@@ -7,6 +7,7 @@ pub mod edge;
 pub mod foliage;
 pub mod gltf;
 pub mod manifest;
+mod manifest_check;
 pub mod matching;
 pub mod mip;
 pub mod original;

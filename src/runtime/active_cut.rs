@@ -103,7 +103,10 @@ impl<'a, V: Visibility> Looking<'a, V> {
         };
         let at = &self.hierarchy.nodes()[node as usize];
         let sight = self.visibility.sight(at, node, self.eye, self.place);
-        let switch = sight.visibility * at.switch_distance * zoom;
+        let mut switch = sight.visibility * at.switch_distance * zoom;
+        if sight.distance < switch {
+            switch *= 1.0 - self.visibility.occlusion(at, self.place);
+        }
         // Rounding: what is as near as this to its switch is looked at in every frame.
         let unsure = 1e-5 * (sight.distance + switch) + 1e-6 * self.path;
         let free = ((sight.distance - switch).abs() - unsure) / sight.rate * self.place.scale;
@@ -114,7 +117,8 @@ impl<'a, V: Visibility> Looking<'a, V> {
     fn nearness(&mut self, node: u32) -> f32 {
         let at = &self.hierarchy.nodes()[node as usize];
         let sight = self.visibility.sight(at, node, self.eye, self.place);
-        sight.distance / (sight.visibility * at.switch_distance * self.zoom.unwrap_or(0.0))
+        let seen = sight.visibility * (1.0 - self.visibility.occlusion(at, self.place));
+        sight.distance / (seen * at.switch_distance * self.zoom.unwrap_or(0.0))
     }
 
     /// Looks again at the nodes of a list that are due (or `all`); `None` where one of them changed.

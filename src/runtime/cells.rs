@@ -9,6 +9,8 @@ pub struct Cells {
     edge: Vec3,
     count: IVec3,
     solidity: Vec<f32>,
+    /// `-ln(1 - solidity)`: infinite where nothing passes.
+    extinction: Vec<f32>,
 }
 
 /// Most cells along a side.
@@ -19,11 +21,13 @@ impl Cells {
     pub fn new(low: Vec3, high: Vec3, count: [u32; 3]) -> Self {
         let count = IVec3::from_array(count.map(|c| (c.min(MAX_COUNT as u32) as i32).max(1)));
         let extent = (high - low).max(Vec3::splat(1e-6));
+        let all = (count.x * count.y * count.z) as usize;
         Self {
             low,
             edge: extent / count.as_vec3(),
             count,
-            solidity: vec![0.0; (count.x * count.y * count.z) as usize],
+            solidity: vec![0.0; all],
+            extinction: vec![0.0; all],
         }
     }
 
@@ -58,9 +62,14 @@ impl Cells {
     /// Sets a cell's solidity, clamped to 0..1; not a number counts as 0.
     pub fn set(&mut self, cell: IVec3, solidity: f32) {
         if let Some(index) = self.index(cell) {
-            let known = if solidity.is_nan() { 0.0 } else { solidity };
-            self.solidity[index] = known.clamp(0.0, 1.0);
+            self.set_index(index, solidity);
         }
+    }
+
+    pub(super) fn set_index(&mut self, index: usize, solidity: f32) {
+        let known = if solidity.is_nan() { 0.0 } else { solidity };
+        self.solidity[index] = known.clamp(0.0, 1.0);
+        self.extinction[index] = -(1.0 - self.solidity[index]).ln();
     }
 
     /// Where a cell is in [`Cells::solidity`]; `None` outside.
@@ -83,8 +92,8 @@ impl Cells {
         self.index(cell).map_or(0.0, |i| self.solidity[i])
     }
 
-    pub(super) fn solidity_mut(&mut self) -> &mut [f32] {
-        &mut self.solidity
+    pub(super) fn extinction_at(&self, cell: IVec3) -> f32 {
+        self.index(cell).map_or(0.0, |i| self.extinction[i])
     }
 }
 

@@ -54,18 +54,26 @@ fn scaled(node: &Node, eye: Vec3, strength: f32) -> Sight {
     }
 }
 
-/// Density of each order-1 branch: the number of siblings whose middle lies within `reach` of its
-/// own, over `full`, the number that hides what is behind it; at most 1.
-///
-/// The neighbourhood is a ball around the branch's middle (Fig. 1(b) of the paper draws a
-/// neighbourhood without a size).
-pub fn sibling_density(middles: &[Vec3], reach: f32, full: f32) -> Vec<f32> {
-    let near = |a: Vec3| {
-        let within = |b: &&Vec3| a.distance_squared(**b) <= reach * reach;
-        middles.iter().filter(within).count() - 1
+/// An order-1 branch among its siblings.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sibling {
+    /// Its middle.
+    pub middle: Vec3,
+    /// Siblings whose middles are as near as this are in its neighbourhood.
+    pub reach: f32,
+    /// Number of siblings that hides what is behind it; above 0.
+    pub full: f32,
+}
+
+/// Density of each order-1 branch: the number of siblings in its neighbourhood over the number that
+/// hides what is behind it, at most 1 (Fig. 1(b) of the paper draws a neighbourhood without a size).
+pub fn sibling_density(siblings: &[Sibling]) -> Vec<f32> {
+    let density = |a: &Sibling| {
+        let within = |b: &&Sibling| a.middle.distance_squared(b.middle) <= a.reach * a.reach;
+        let near = siblings.iter().filter(within).count() - 1;
+        (near as f32 / a.full.max(1e-6)).min(1.0)
     };
-    let density = |&a: &Vec3| (near(a) as f32 / full.max(1e-6)).min(1.0);
-    middles.iter().map(density).collect()
+    siblings.iter().map(density).collect()
 }
 
 #[cfg(test)]
@@ -109,15 +117,21 @@ mod tests {
 
     #[test]
     fn density_counts_neighbours_and_saturates() {
-        let ring: Vec<Vec3> = (0..8)
-            .map(|i| {
-                let (sin, cos) = (i as f32 * std::f32::consts::FRAC_PI_4).sin_cos();
-                Vec3::new(cos, 0.0, sin)
-            })
-            .collect();
+        let ring = |reach: f32| -> Vec<Sibling> {
+            (0..8)
+                .map(|i| {
+                    let (sin, cos) = (i as f32 * std::f32::consts::FRAC_PI_4).sin_cos();
+                    Sibling {
+                        middle: Vec3::new(cos, 0.0, sin),
+                        reach,
+                        full: 4.0,
+                    }
+                })
+                .collect()
+        };
         // Neighbours on the ring are 0.77 apart, the next but one 1.41.
-        assert_eq!(sibling_density(&ring, 0.8, 4.0), [0.5; 8]);
-        assert_eq!(sibling_density(&ring, 1.5, 4.0), [1.0; 8]);
-        assert_eq!(sibling_density(&ring[..1], 1.5, 4.0), [0.0]);
+        assert_eq!(sibling_density(&ring(0.8)), [0.5; 8]);
+        assert_eq!(sibling_density(&ring(1.5)), [1.0; 8]);
+        assert_eq!(sibling_density(&ring(1.5)[..1]), [0.0]);
     }
 }

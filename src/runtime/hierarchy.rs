@@ -20,11 +20,11 @@ pub struct Subtree {
     pub branch: Vec3,
     /// Density of that branch's siblings, 0 (alone) to 1 (what is behind them is hidden).
     pub density: f32,
-    /// The leaves on its own branch, where it carries other branches as well.
+    /// What grows on its own branch (leaves, wood), where it carries other branches as well.
     pub own: Option<OwnLeaves>,
 }
 
-/// Leaves that hang on a sub-tree's own branch.
+/// What grows on a sub-tree's own branch: leaves, and the branch's wood.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OwnLeaves {
     /// Centre of the bounding sphere.
@@ -141,7 +141,8 @@ impl Hierarchy {
             open.push(out.push(&subtrees[index], subtree, parent));
             stack.push(None);
             stack.extend(children[index].iter().rev().map(|&c| Some(c)));
-            if !children[index].is_empty() && own_leaves[index] > 0 {
+            let has_own = own_leaves[index] > 0 || subtrees[index].own.is_some();
+            if !children[index].is_empty() && has_own {
                 out.push_own(&subtrees[index], subtree, own_leaves[index]);
             }
         }

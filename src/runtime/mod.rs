@@ -10,7 +10,7 @@
 //!                Plain      distance alone
 //!                Density    Deng: rear branches of a dense crown count as farther off
 //!                Hidden     El-Sana: what the cells of a grid hide counts less
-//!                Measured   ours: pixels counted beforehand from directions over the sphere
+//! Measured     ours: pixels counted beforehand from directions over the sphere
 //! ActiveCut    follows the camera through one tree by splits and merges
 //! Forest       the same for many trees; most of them cost one comparison a frame
 //! Spender      Lee: which leaves to draw under a budget
@@ -54,7 +54,7 @@ mod visibility;
 pub use active_cut::{ActiveCut, Changes};
 pub use budget::{Chosen, Item, Spender, by_distance, by_normal};
 pub use cells::Cells;
-pub use density::{Density, DotProduct, sibling_density};
+pub use density::{Density, DotProduct, Sibling, sibling_density};
 pub use forest::{Drawn, Forest, Form};
 pub use hierarchy::{Flaw, Hierarchy, Node, Origin, OwnLeaves, Subtree};
 pub use measured::{Measured, Measuring};

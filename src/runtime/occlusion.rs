@@ -33,6 +33,7 @@ pub enum Law {
 pub struct Occlusion<'g> {
     cells: &'g Cells,
     law: Law,
+    clumping: f32,
     eye: IVec3,
     /// Number of the eye's cell among those visited, from 1.
     stamp: u32,
@@ -50,10 +51,21 @@ impl<'g> Occlusion<'g> {
         Self {
             cells,
             law,
+            clumping: 1.0,
             eye: IVec3::MIN,
             stamp: 0,
             known: vec![(0, 0.0); cells.solidity().len()],
             computed: 0,
+        }
+    }
+
+    /// Lets so much of the extinction count under [`Law::Beer`], 0 to 1: leaves crowd in crowns and on
+    /// twigs, and what crowds hides less than what is spread evenly over a cell. Foresters call it
+    /// the clumping index and measure 0.5 to 0.9 (Chen and others 2005); what a cut must not lose asks for less.
+    pub fn clumped(self, clumping: f32) -> Self {
+        Self {
+            clumping: clumping.clamp(0.0, 1.0),
+            ..self
         }
     }
 
@@ -95,7 +107,7 @@ impl<'g> Occlusion<'g> {
             return value;
         }
         self.computed += 1;
-        let value = walk(self.cells, self.eye, cell, self.law);
+        let value = walk(self.cells, self.eye, cell, self.law, self.clumping);
         self.known[index] = (self.stamp, value);
         value
     }
@@ -112,7 +124,7 @@ impl<'g> Occlusion<'g> {
 }
 
 /// Walks from one cell's middle to another's and returns the occlusion probability there.
-fn walk(cells: &Cells, from: IVec3, to: IVec3, law: Law) -> f32 {
+fn walk(cells: &Cells, from: IVec3, to: IVec3, law: Law, clumping: f32) -> f32 {
     let way = to - from;
     let steps = way.abs();
     let length = (way.as_vec3() * cells.edge()).length();
@@ -136,35 +148,41 @@ fn walk(cells: &Cells, from: IVec3, to: IVec3, law: Law) -> f32 {
         taken[axis] = past.clamp(0, steps[axis]);
     }
     let mut at = enter;
-    let (mut hidden, mut passing) = (0.0f32, 1.0f32);
+    let mut next = [0, 1, 2].map(|axis| crossing(axis, taken[axis]));
+    // Equation 4 multiplies what passes; Beer's law sums up the logarithm of it.
+    let (mut hidden, mut passing, mut depth) = (0.0f32, 1.0f32, 0.0f32);
     loop {
         let cell = from + way.signum() * taken;
-        let next = [0, 1, 2].map(|axis| crossing(axis, taken[axis]));
         let end = next[0].min(next[1]).min(next[2]).min(1.0);
         let last = cell == to || end >= 1.0;
-        let rho = cells.solidity_at(cell);
         let portion = length * (end - at).max(0.0) as f32 / unit;
         match law {
             Law::Equation4 => {
+                let rho = cells.solidity_at(cell);
                 hidden += rho * passing;
                 passing *= (1.0 - rho) * (-portion).exp();
             }
-            Law::Beer if last => {}
             Law::Beer => {
-                passing *= if rho >= 1.0 {
-                    0.0
-                } else {
-                    (1.0 - rho).powf(portion)
-                };
-                hidden = 1.0 - passing;
+                let extinction = cells.extinction_at(cell);
+                if !last && extinction > 0.0 {
+                    depth += extinction * portion;
+                }
             }
         }
-        if last || passing <= 0.0 {
+        if last || passing <= 0.0 || depth == f32::INFINITY {
+            let hidden = match law {
+                Law::Equation4 => hidden,
+                Law::Beer if depth == f32::INFINITY => 1.0,
+                Law::Beer => 1.0 - (-depth * clumping).exp(),
+            };
             return hidden.clamp(0.0, 1.0);
         }
         at = end;
         for axis in 0..3 {
-            taken[axis] += i32::from(next[axis] <= end);
+            if next[axis] <= end {
+                taken[axis] += 1;
+                next[axis] = crossing(axis, taken[axis]);
+            }
         }
     }
 }
@@ -212,12 +230,13 @@ pub struct Hidden<'g, V> {
 
 impl<V: Visibility> Visibility for Hidden<'_, V> {
     fn sight(&mut self, node: &Node, index: u32, eye: Vec3, place: &Place) -> Sight {
-        let sight = self.inner.sight(node, index, eye, place);
+        self.inner.sight(node, index, eye, place)
+    }
+
+    fn occlusion(&mut self, node: &Node, place: &Place) -> f32 {
+        let inner = self.inner.occlusion(node, place);
         let hidden = self.occlusion.probability(place.to_world(node.center));
-        Sight {
-            visibility: blend(sight.visibility, 0.0, hidden),
-            ..sight
-        }
+        1.0 - blend(1.0 - inner, 0.0, hidden)
     }
 
     fn epoch(&mut self, eye: Vec3) -> u64 {
@@ -282,6 +301,16 @@ mod tests {
     }
 
     #[test]
+    fn clumping_weakens_all_but_walls() {
+        let cells = row(&[0.5, 0.0, 1.0, 0.0]);
+        let mut occlusion = Occlusion::new(&cells, Law::Beer).clumped(0.5);
+        occlusion.look_from(Vec3::new(-0.5, 0.5, 0.5));
+        let mut at = |i: i32| occlusion.probability(cells.middle(IVec3::new(i, 0, 0)));
+        assert!((at(1) - (1.0 - 0.5f32.sqrt())).abs() < 1e-6);
+        assert_eq!(at(3), 1.0);
+    }
+
+    #[test]
     fn a_solid_cell_hides_all_behind_it_and_air_hides_nothing() {
         let wall = seen(&row(&[0.0, 0.0, 1.0, 0.0, 0.4, 0.0]), Law::Beer, 0.5);
         assert_eq!(wall, [0.0, 0.0, 0.0, 1.0, 1.0, 1.0]);
@@ -329,7 +358,7 @@ mod tests {
                 for n in 0..40 {
                     let cell = start + step * n;
                     if cells.index(cell).is_some() {
-                        let p = walk(&cells, start, cell, law);
+                        let p = walk(&cells, start, cell, law, 1.0);
                         assert!(p >= before - 1e-6, "{law:?}: {p} after {before}");
                         before = p;
                     }

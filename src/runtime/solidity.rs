@@ -34,12 +34,12 @@ pub fn by_faces(
     let edge = cells.edge();
     let area = Vec3::new(edge.y * edge.z, edge.z * edge.x, edge.x * edge.y);
     let whole = area.element_sum() * (SIDE * SIDE) as f32;
-    for (mask, solidity) in masks.chunks_exact(WORDS).zip(cells.solidity_mut()) {
+    for (index, mask) in masks.chunks_exact(WORDS).enumerate() {
         let covered = |axis: usize| -> f32 {
             let words = &mask[axis * WORDS / 3..(axis + 1) * WORDS / 3];
             area[axis] * words.iter().map(|w| w.count_ones()).sum::<u32>() as f32
         };
-        *solidity = ((covered(0) + covered(1) + covered(2)) / whole).min(1.0);
+        cells.set_index(index, (covered(0) + covered(1) + covered(2)) / whole);
     }
 }
 
@@ -128,7 +128,8 @@ pub fn by_rays(
                 })
             })
         });
-        cells.solidity_mut()[index] = stopped.count() as f32 / rays.max(1) as f32;
+        let share = stopped.count() as f32 / rays.max(1) as f32;
+        cells.set_index(index, share);
     }
 }
 
@@ -196,8 +197,7 @@ pub fn splat(forest: &mut Cells, extinction: &mut [f32], tree: &Cells, place: &P
                 let at = forest.cell_of(place.to_world(tree.middle(cell)));
                 if let Some(index) = forest.index(at) {
                     extinction[index] += -(1.0 - solid).ln() / length * volume / own_volume;
-                    let rho = 1.0 - (-extinction[index] * own_length).exp();
-                    forest.solidity_mut()[index] = rho.clamp(0.0, 1.0);
+                    forest.set_index(index, 1.0 - (-extinction[index] * own_length).exp());
                 }
             }
         }

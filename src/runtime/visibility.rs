@@ -19,11 +19,19 @@ pub struct Sight {
 
 /// An estimator of visibility.
 ///
-/// `visibility` may only change with [`Visibility::epoch`], unless `rate` is infinite: that lets a
+/// Visibility and occlusion may only change with [`Visibility::epoch`], unless `rate` is infinite: that lets a
 /// cut leave alone what can't have changed, and still be the same as a cut made anew.
 pub trait Visibility {
     /// How a node of a tree at `place` is seen by an eye, given in the tree's own space.
     fn sight(&mut self, node: &Node, index: u32, eye: Vec3, place: &Place) -> Sight;
+
+    /// Probability that a node is hidden, 0 to 1, which lessens its visibility (equation 5 of El-Sana).
+    /// Asked only of nodes that would else be opened: it may cost more than a sight, and may only
+    /// change with the epoch.
+    fn occlusion(&mut self, node: &Node, place: &Place) -> f32 {
+        let _ = (node, place);
+        0.0
+    }
 
     /// A number that changes when visibilities may have; asked once a frame, before everything else.
     fn epoch(&mut self, eye: Vec3) -> u64 {

@@ -1,0 +1,242 @@
+//! Triangles, splits and merges, time and changed visible triangles along a camera path (El-Sana and
+//! others 2001, Table 1), with and without occlusion, by both solidities and several grids.
+
+use std::path::Path;
+use std::time::Instant;
+
+use serde_json::{Value, json};
+
+use super::deng::Settings;
+use super::picture::Sheet;
+use super::scenes::{
+    HEIGHT_PX, TREES, approach, five_species, forest, forest_cells, stand_at, tree_cells, walk,
+};
+use super::species::Species;
+use super::stand::{Frame, Key, Stand, Walk};
+use crate::error::Result;
+use crate::report::agreement;
+use crate::runtime::{Cells, Hidden, Law, Occlusion, Plain, View};
+
+/// Rays through a cell.
+const RAYS: u32 = 64;
+
+/// One way to follow a path.
+#[derive(Clone, Debug)]
+pub struct Row {
+    /// Solidity, grid and law, or "without".
+    pub name: String,
+    /// Triangles a frame.
+    pub triangles: f64,
+    /// Nodes opened and closed a frame.
+    pub changes: [f64; 2],
+    /// Microseconds a frame for choosing.
+    pub select_us: f64,
+    /// Milliseconds a frame for drawing (on the processor).
+    pub draw_ms: f64,
+    /// Share of the triangles seen without occlusion that are no longer drawn.
+    pub changed_triangles: f64,
+    /// Share of the covered samples that no longer show the same triangle.
+    pub changed_samples: f64,
+    /// F1 of the silhouette against the one without occlusion.
+    pub f1: f64,
+}
+
+/// The whole study.
+pub struct Study {
+    /// Name, trees and rows of each scene.
+    pub scenes: Vec<(String, usize, Vec<Row>)>,
+    sheet: Sheet,
+}
+
+/// What is tried: law, rays (or face projection), grid.
+type Grid = (Law, Option<u32>, Cells, String);
+
+/// Runs the study on a tree, and on a forest of five grown species.
+///
+/// # Errors
+/// Where the forest's trees can't be grown.
+pub fn study(tree: Species, settings: &Settings) -> Result<Study> {
+    let name = tree.tree.model.name.clone();
+    let place = stand_at(&tree.tree, glam::Vec2::ZERO, 0.0, 1.0, 0);
+    let alone = [tree];
+    let grids = [(None, 6), (None, 12), (None, 24), (Some(RAYS), 12)].map(|(rays, longest)| {
+        let cells = tree_cells(&alone[0], &place, longest, rays);
+        (Law::Beer, rays, cells, format!("{longest} cells"))
+    });
+    let path = approach(&place, settings.frames);
+    let stand = Stand::new(&alone, vec![place]);
+    let (one, _) = rows(&stand, with_equation_4(grids.to_vec(), 1), &path, settings);
+    let species = five_species()?;
+    let places = forest(&species, TREES);
+    let grids = [(None, 8.0), (None, 4.0), (None, 2.0), (Some(RAYS), 4.0)].map(|(rays, edge)| {
+        let cells = forest_cells(&species, &places, edge, rays);
+        (Law::Beer, rays, cells, format!("{edge} m"))
+    });
+    let stand = Stand::new(&species, places);
+    let (many, frames) = rows(
+        &stand,
+        with_equation_4(grids.to_vec(), 1),
+        &walk(settings.frames),
+        settings,
+    );
+    let (width, height, _) = frames[0].picture();
+    let mut sheet = Sheet::new(1, frames.len(), width, height);
+    for (row, frame) in frames.iter().enumerate() {
+        sheet.put(0, row, &frame.picture().2);
+    }
+    Ok(Study {
+        scenes: vec![
+            (name, 1, one),
+            ("forest of five species".into(), TREES, many),
+        ],
+        sheet,
+    })
+}
+
+/// The same by the printed law, with one of the grids.
+fn with_equation_4(mut grids: Vec<Grid>, pick: usize) -> Vec<Grid> {
+    let (_, rays, cells, name) = grids[pick].clone();
+    grids.push((Law::Equation4, rays, cells, name));
+    grids
+}
+
+/// Every grid along a path, and one frame without and with occlusion (the second grid).
+fn rows(
+    stand: &Stand,
+    grids: Vec<Grid>,
+    path: &[View],
+    settings: &Settings,
+) -> (Vec<Row>, Vec<Frame>) {
+    let pictures = settings.pictures;
+    let shown: Vec<usize> = (0..pictures)
+        .map(|i| (2 * i + 1) * path.len() / (2 * pictures))
+        .collect();
+    let views: Vec<&View> = shown.iter().map(|&f| &path[f]).collect();
+    let plain = stand.walk(Plain, path, &shown);
+    let (frames, draw_ms) = draw(stand, &plain, &views);
+    let mut out = vec![row("without".into(), &plain, &frames, &frames, draw_ms)];
+    let mut kept = None;
+    for (law, rays, cells, name) in &grids {
+        let hidden = Hidden {
+            inner: Plain,
+            occlusion: Occlusion::new(cells, *law).clumped(settings.clumping),
+        };
+        let walk = stand.walk(hidden, path, &shown);
+        let (drawn, draw_ms) = draw(stand, &walk, &views);
+        let how = if rays.is_some() { "rays" } else { "faces" };
+        let law = match law {
+            Law::Beer => "",
+            Law::Equation4 => ", eq. 4 as printed",
+        };
+        out.push(row(
+            format!("{how}, {name}{law}"),
+            &walk,
+            &frames,
+            &drawn,
+            draw_ms,
+        ));
+        if out.len() == 3 {
+            kept = drawn.into_iter().nth(pictures / 2);
+        }
+    }
+    let first = frames.into_iter().nth(pictures / 2);
+    (out, first.into_iter().chain(kept).collect())
+}
+
+fn draw(stand: &Stand, walk: &Walk, views: &[&View]) -> (Vec<Frame>, f64) {
+    let start = Instant::now();
+    let frames: Vec<Frame> = walk
+        .shown
+        .iter()
+        .zip(views)
+        .map(|(drawn, view)| stand.draw(drawn, view, HEIGHT_PX))
+        .collect();
+    let ms = start.elapsed().as_secs_f64() * 1e3 / frames.len().max(1) as f64;
+    (frames, ms)
+}
+
+fn row(name: String, walk: &Walk, without: &[Frame], with: &[Frame], draw_ms: f64) -> Row {
+    let n = without.len().max(1) as f64;
+    let mean = |figure: &dyn Fn(usize) -> f64| (0..without.len()).map(figure).sum::<f64>() / n;
+    let gone = |i: usize| {
+        let mut drawn: Vec<u64> = walk.shown[i].iter().map(Key::drawn_of).collect();
+        drawn.sort_unstable();
+        let seen = without[i].visible();
+        let lost = seen
+            .iter()
+            .filter(|k| drawn.binary_search(&k.drawn()).is_err());
+        lost.count() as f64 / seen.len().max(1) as f64
+    };
+    Row {
+        name,
+        triangles: walk.cost.triangles,
+        changes: walk.changes,
+        select_us: walk.micros,
+        draw_ms,
+        changed_triangles: mean(&gone),
+        changed_samples: mean(&|i| 1.0 - without[i].agrees(&with[i], |a, b| a == b)),
+        f1: mean(&|i| agreement(&without[i].coverage(), &with[i].coverage()).f1()),
+    }
+}
+
+impl Study {
+    /// The figures for programs.
+    pub fn to_json(&self) -> Value {
+        let row = |r: &Row| {
+            json!({
+                "name": r.name, "triangles": r.triangles, "splits": r.changes[0], "merges": r.changes[1],
+                "select_us": r.select_us, "draw_ms": r.draw_ms, "changed_triangles": r.changed_triangles,
+                "changed_samples": r.changed_samples, "f1": r.f1,
+            })
+        };
+        let scene = |(name, trees, rows): &(String, usize, Vec<Row>)| json!({ "scene": name, "trees": trees, "rows": rows.iter().map(row).collect::<Vec<_>>() });
+        json!({ "scenes": self.scenes.iter().map(scene).collect::<Vec<_>>() })
+    }
+
+    /// The figures for people.
+    pub fn table(&self) -> String {
+        let mut out = String::new();
+        for (name, trees, rows) in &self.scenes {
+            out += &format!(
+                "{name} ({trees} {}), means a frame\n{:<34}{:>11}{:>8}{:>8}{:>8}{:>11}{:>9}{:>11}{:>10}{:>8}\n",
+                if *trees == 1 { "tree" } else { "trees" },
+                "",
+                "triangles",
+                "splits",
+                "merges",
+                "us",
+                "draw ms",
+                "saved",
+                "changed",
+                "samples",
+                "F1"
+            );
+            for row in rows {
+                let time = |r: &Row| r.draw_ms + r.select_us / 1e3;
+                out += &format!(
+                    "{:<34}{:>11.0}{:>8.1}{:>8.1}{:>8.0}{:>11.2}{:>7.0} %{:>9.2} %{:>8.2} %{:>8.4}\n",
+                    row.name,
+                    row.triangles,
+                    row.changes[0],
+                    row.changes[1],
+                    row.select_us,
+                    row.draw_ms,
+                    100.0 * (1.0 - time(row) / time(&rows[0]).max(1e-9)),
+                    100.0 * row.changed_triangles,
+                    100.0 * row.changed_samples,
+                    row.f1
+                );
+            }
+            out += "\n";
+        }
+        out + "saved: of the time for choosing and drawing; changed: of the triangles that are seen without occlusion\n"
+    }
+
+    /// Writes el-sana.png: one view of the forest without and with occlusion.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`].
+    pub fn write(&self, folder: &Path) -> Result<()> {
+        self.sheet.write(&folder.join("el-sana.png"))
+    }
+}
