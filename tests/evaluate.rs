@@ -371,6 +371,58 @@ fn the_command_prints_the_report_and_writes_it_with_pictures() {
     }
 }
 
+/// One file that asks for nothing else, with pictures for every level and each of them named.
+#[test]
+fn the_page_holds_everything_itself() {
+    let oak = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/oak.glb");
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().to_str().unwrap();
+    let (near, far) = (format!("{oak}@48"), format!("{oak}@24"));
+    let done = evaluate_command(&[
+        oak,
+        &near,
+        &far,
+        "--height",
+        "32",
+        "--views",
+        "3",
+        "--elevations",
+        "0",
+        "-o",
+        out,
+    ]);
+    assert!(
+        done.status.success(),
+        "{}",
+        String::from_utf8_lossy(&done.stderr)
+    );
+    let text = String::from_utf8(done.stdout).unwrap();
+    assert!(
+        text.contains("FLIP") && text.contains("turned by 1 degree"),
+        "{text}"
+    );
+    let page = std::fs::read_to_string(folder.path().join("report.html")).unwrap();
+    for wanted in [
+        "<html lang=\"en\">",
+        "id=\"level-2\"",
+        "Precision and recall",
+        "prefers-color-scheme",
+    ] {
+        assert!(page.contains(wanted), "{wanted}");
+    }
+    for foreign in ["http:", "https:", "@import", "src=\"/"] {
+        assert!(!page.contains(foreign), "{foreign}");
+    }
+    let pictures = page.matches("<img").count();
+    assert_eq!(
+        pictures,
+        page.matches("src=\"data:image/png;base64,").count()
+    );
+    assert_eq!(pictures, page.matches(" alt=\"").count());
+    // For each level: two pictures twice, two maps, and the images of its file.
+    assert!(pictures >= 2 * 7, "{pictures}");
+}
+
 #[test]
 fn the_command_refuses_what_it_cannot_read_or_measure() {
     let oak = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/oak.glb");

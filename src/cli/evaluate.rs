@@ -6,7 +6,7 @@ use crate::botany::Model;
 use crate::botany::load::load;
 use crate::error::{Error, Result};
 use crate::report::schema::{Figure, Level, Report, SizeFigures};
-use crate::report::{Settings, contact_sheet, evaluate, start_height_px};
+use crate::report::{Content, Settings, contact_sheet, evaluate, start_height_px};
 use crate::space::raster::Sampling;
 use crate::space::view::View;
 
@@ -19,7 +19,7 @@ pub struct Args {
     /// of pleach say so themselves); it is measured there and at half of it as well.
     #[arg(required = true, value_name = "LEVEL[@PIXELS]")]
     levels: Vec<String>,
-    /// Folder for report.json and contact.png.
+    /// Folder for report.html, report.json and contact.png.
     #[arg(short, long)]
     output: Option<PathBuf>,
     /// Heights of the tree on the screen, pixels.
@@ -140,6 +140,14 @@ fn write(
     let height_px = settings.heights_px.first().copied().unwrap_or(256);
     let shown = views_to_show(report, settings);
     let models: Vec<&Model> = levels.iter().collect();
+    let page = Content {
+        report,
+        original,
+        levels: &models,
+        views: &settings.view_set(),
+    };
+    let file = folder.join("report.html");
+    std::fs::write(&file, page.html()?).map_err(|e| Error::io(&file, "write", e))?;
     for (name, sampling) in [
         ("contact.png", Some(Sampling::REFERENCE)),
         (

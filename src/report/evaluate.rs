@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use super::appearance::{Asked, appearance};
+use super::base_color::base_color;
 use super::cost::{draw_calls, texture_bytes};
 use super::drawable::Drawable;
 use super::reference::Reference;
@@ -118,6 +119,9 @@ pub fn evaluate(
                 .push(measure(&reference, drawable, settings.client));
         }
     }
+    if settings.client {
+        add_base_colors(original.0, levels, &views, &mut rows);
+    }
     let mut measured = rows.split_off(1);
     if settings.appearance {
         add_appearance(original.0, levels, &heights, settings, &mut measured);
@@ -127,6 +131,25 @@ pub fn evaluate(
         original: rows.pop(),
         levels,
         ..Report::default()
+    }
+}
+
+/// What engines show without light, for `rows` of the original and its levels.
+fn add_base_colors(
+    original: &Model,
+    levels: &[(&Model, &str)],
+    views: &[View],
+    rows: &mut [Level],
+) {
+    let models = [original].into_iter().chain(levels.iter().map(|(m, _)| *m));
+    for (row, model) in rows.iter_mut().zip(models) {
+        let drawable = Drawable::shaded(model);
+        for size in &mut row.sizes {
+            let (height, px) = (original.height(), size.height_px);
+            if let Some(client) = &mut size.client {
+                client.base_color_linear = base_color(&drawable, original.frame, height, views, px);
+            }
+        }
     }
 }
 

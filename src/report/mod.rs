@@ -5,6 +5,7 @@
 
 mod appearance;
 pub mod band;
+mod base_color;
 mod contact;
 mod cost;
 mod drawable;
@@ -12,6 +13,7 @@ mod evaluate;
 mod flip;
 mod judge;
 mod lab;
+mod page;
 mod reference;
 pub mod schema;
 mod shot;
@@ -24,6 +26,7 @@ pub use cost::{draw_calls, texture_bytes};
 pub use drawable::Drawable;
 pub use evaluate::{Settings, evaluate};
 pub use judge::{Judged, heights, judge};
+pub use page::Content;
 pub use reference::Reference;
 pub use silhouette::{Agreement, agreement};
 pub use start::start_height_px;

@@ -184,6 +184,7 @@ impl Reference {
             area_ratio: Figure::ratio(over(|v| v.area_ratio)),
             half_area_ratio: Figure::ratio(over(|v| v.half_area_ratio)),
             client: None,
+            base_color_linear: None,
             appearance: None,
             views,
         }

@@ -77,6 +77,10 @@ pub struct SizeFigures {
     /// the same supersampled original; only where it was asked for.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub client: Option<Box<SizeFigures>>,
+    /// Mean linear RGB of the base colour, without light, of what an engine draws; only in `client`
+    /// of an evaluation.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub base_color_linear: Option<[f64; 3]>,
     /// Colours, distances and normals against the original's; absent where they were not measured
     /// (in the report of a bake).
     #[serde(skip_serializing_if = "Option::is_none", default)]

@@ -37,31 +37,43 @@ function serve(files) {
   return new Promise((done) => server.listen(0, '127.0.0.1', () => done(server)));
 }
 
-/** Opens `page` with `files` at hand, waits for `window.ready`, runs `work(page)` and cleans up. Page errors are errors. */
-export async function withPage(html, files, work) {
-  const server = await serve(files);
+/** Starts a browser for `work(browser)` and cleans up. */
+export async function withBrowser(work) {
   const browser = await chromium.launch({
     executablePath: process.env.CHROMIUM ?? '/usr/bin/chromium',
     args: FLAGS,
     headless: true,
   });
   try {
-    const page = await browser.newPage();
-    const trouble = [];
-    page.on('pageerror', (error) => trouble.push(error.message));
-    page.on('console', (message) => {
-      if (['error', 'warning'].includes(message.type())) trouble.push(message.text());
-    });
-    page.setDefaultTimeout(600_000);
-    await page.goto(`http://127.0.0.1:${server.address().port}/${html}`);
-    try {
-      await page.waitForFunction('window.ready', undefined, { timeout: 60_000 });
-    } catch {
-      throw new Error(`the page did not start: ${trouble.join('; ') || 'no message'}`);
-    }
-    return await work(page, trouble);
+    return await work(browser);
   } finally {
     await browser.close();
+  }
+}
+
+/** Opens `page` with `files` at hand, waits for `window.ready`, runs `work(page)` and cleans up. Page errors are errors. */
+export async function withPage(html, files, work) {
+  const server = await serve(files);
+  try {
+    return await withBrowser((browser) => onPage(browser, `http://127.0.0.1:${server.address().port}/${html}`, work));
+  } finally {
     server.close();
   }
+}
+
+async function onPage(browser, url, work) {
+  const page = await browser.newPage();
+  const trouble = [];
+  page.on('pageerror', (error) => trouble.push(error.message));
+  page.on('console', (message) => {
+    if (['error', 'warning'].includes(message.type())) trouble.push(message.text());
+  });
+  page.setDefaultTimeout(600_000);
+  await page.goto(url);
+  try {
+    await page.waitForFunction('window.ready', undefined, { timeout: 60_000 });
+  } catch {
+    throw new Error(`the page did not start: ${trouble.join('; ') || 'no message'}`);
+  }
+  return await work(page, trouble);
 }

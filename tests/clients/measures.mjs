@@ -25,23 +25,39 @@ export function boxDown({ width, height, rgba }, factor) {
   return { width: w, height: h, rgba: out };
 }
 
-/** Covered pixels, summed coverage, mean colour (sRGB, 0..255) and covered pixels in each row. */
+/** Covered pixels, summed coverage, mean colour (sRGB, 0..255, and as light, 0..1) and covered pixels in each row. */
 export function measure({ width, height, rgba }) {
   const mask = new Uint8Array(width * height);
   const rows = new Float64Array(height);
   const colour = [0, 0, 0];
+  const light = [0, 0, 0];
   let area = 0;
   let coverage = 0;
   for (let i = 0; i < mask.length; i++) {
     const alpha = rgba[i * 4 + 3];
     coverage += alpha / 255;
-    for (let c = 0; c < 3; c++) colour[c] += rgba[i * 4 + c];
+    for (let c = 0; c < 3; c++) {
+      colour[c] += rgba[i * 4 + c];
+      if (alpha) light[c] += (alpha / 255) * linear(rgba[i * 4 + c] / alpha);
+    }
     if (alpha < HALF) continue;
     mask[i] = 1;
     area += 1;
     rows[Math.floor(i / width)] += 1;
   }
-  return { mask, rows, area, coverage, colour: colour.map((sum) => sum / Math.max(coverage, 1e-9)) };
+  const mean = (sum) => sum / Math.max(coverage, 1e-9);
+  return { mask, rows, area, coverage, colour: colour.map(mean), light: light.map(mean) };
+}
+
+/** Light of an sRGB value, both 0..1. */
+function linear(value) {
+  return value <= 0.04045 ? value / 12.92 : ((value + 0.055) / 1.055) ** 2.4;
+}
+
+/** Mean light of several pictures, weighted by their coverage. */
+export function meanLight(views) {
+  const coverage = views.reduce((sum, view) => sum + view.coverage, 0);
+  return [0, 1, 2].map((c) => views.reduce((sum, view) => sum + view.light[c] * view.coverage, 0) / Math.max(coverage, 1e-9));
 }
 
 /**

@@ -56,6 +56,19 @@ function unload({ scene }) {
   for (const material of materials(scene)) material.dispose();
 }
 
+/** Base colours alone, as they are cut by alpha; returns a function that brings the materials back. */
+function withoutLight(scene) {
+  const before = [];
+  scene.traverse((object) => {
+    if (!object.isMesh) return;
+    before.push([object, object.material]);
+    const plain = ({ map, color, alphaTest, side, vertexColors, transparent, opacity }) =>
+      new THREE.MeshBasicMaterial({ map, color, alphaTest, side, vertexColors, transparent, opacity });
+    object.material = Array.isArray(object.material) ? object.material.map(plain) : plain(object.material);
+  });
+  return () => before.forEach(([object, material]) => (object.material = material));
+}
+
 /** Takes mips away: what the reference samples. */
 function withoutMips(scene) {
   for (const texture of textures(scene)) {
@@ -128,17 +141,19 @@ window.measureFile = async ({ url, label, modes, heights, views, shown, fov }) =
   const results = [];
   for (const mode of modes) {
     if (mode === 'reference') withoutMips(tree.scene);
+    const light = mode === 'unlit' ? withoutLight(tree.scene) : () => {};
     for (const height of heights) {
       const factor = mode === 'reference' ? SUPERSAMPLE : 1;
       const pixels = side(original.box, height);
       const rows = views.map((view, index) => {
         const eye = camera(original.box, height, view, fov);
-        const picture = boxDown(frame(renderers[mode], tree.scene, eye, pixels * factor), factor);
-        if (shown.includes(index)) keep(height, `${label}, ${mode}`, picture);
+        const picture = boxDown(frame(renderers[mode === 'reference' ? mode : 'client'], tree.scene, eye, pixels * factor), factor);
+        if (shown.includes(index) && mode !== 'unlit') keep(height, `${label}, ${mode}`, picture);
         return { view, measured: measure(picture) };
       });
       results.push({ mode, height_px: height, rows });
     }
+    light();
   }
   for (const { mode, height_px, rows } of results) {
     if (mode === 'reference' && !references.has(height_px)) references.set(height_px, rows.map((row) => row.measured));
@@ -153,6 +168,8 @@ window.measureFile = async ({ url, label, modes, heights, views, shown, fov }) =
         ...view,
         area_px: measured.area,
         colour: measured.colour,
+        light: measured.light,
+        coverage: measured.coverage,
         ...compare(measured, references.get(height_px)[index]),
       })),
     })),

@@ -3,9 +3,14 @@
 //
 //   node three.mjs ORIGINAL.glb [LEVEL.glb[@HEIGHT[,HEIGHT...]]]... [--package DIR] [-o DIR] [--height PX,...]
 //                  [--views A/E,...] [--around N] [--offset DEGREES] [--fov DEGREES] [--supersampled] [--targets]
+//                  [--agree REPORT.json]
 //
 // HEIGHT is the tree's height in pixels (default 256). --package adds all levels of a bake, each where its report.json
 // measured it, its own height, and at half of that, which is twice the distance.
+// --agree holds our own raster to three.js: REPORT.json is what `pleach evaluate --client -o` wrote of the same files at
+// the same heights and views (`--views 3N+1 --elevations 0,30,-15 --azimuth-offset DEGREES` for `--around N --offset
+// DEGREES`); precision and recall have to agree within 0.02, mean base colours, drawn without light, within 2 % of their
+// brightest channel.
 // The original is drawn supersampled too, the levels only with --supersampled. Fails if a level is empty from any side,
 // upside down, or of another colour; with --targets also if it misses what the README promises. Prints one JSON object;
 // with DIR it is written there instead, as three.json, beside a sheet of pictures for each height.
@@ -13,7 +18,7 @@ import { mkdirSync, readFileSync, writeFileSync } from 'node:fs';
 import { basename, join } from 'node:path';
 import { parseArgs } from 'node:util';
 import { withPage } from './browser.mjs';
-import { summarise } from './measures.mjs';
+import { meanLight, summarise } from './measures.mjs';
 import { parseViews, views as defaultViews } from './views.mjs';
 
 /** A level covers at least this share of the original from every side. */
@@ -23,6 +28,9 @@ const MOST_COLOUR_ERROR = 20;
 /** What the README promises: area within these bounds, F1 within this of the supersampled level. */
 const TARGET_AREA = [0.95, 1.05];
 const TARGET_F1_LOSS = 0.03;
+/** How far our raster may be from three.js: precision and recall, and the share of a mean colour. */
+const AGREE_SILHOUETTE = 0.02;
+const AGREE_COLOUR = 0.02;
 
 const { values: options, positionals } = parseArgs({
   allowPositionals: true,
@@ -36,6 +44,7 @@ const { values: options, positionals } = parseArgs({
     fov: { type: 'string', default: '0' },
     supersampled: { type: 'boolean', default: false },
     targets: { type: 'boolean', default: false },
+    agree: { type: 'string' },
   },
 });
 if (positionals.length === 0) {
@@ -65,7 +74,7 @@ const report = await withPage('three.html', files.map((f) => f.file), async (pag
   const about = await page.evaluate('about()');
   const levels = [];
   for (const [index, { file, heights }] of files.entries()) {
-    const job = { url: `/file/${index}`, label: basename(file), modes: index === 0 || supersampled ? ['client', 'reference'] : ['client'], heights, views, shown, fov: Number(options.fov) };
+    const job = { url: `/file/${index}`, label: basename(file), modes: ['client', options.agree && 'unlit', (index === 0 || supersampled) && 'reference'].filter(Boolean), heights, views, shown, fov: Number(options.fov) };
     const measured = await page.evaluate((j) => window.measureFile(j), job);
     levels.push({ file, original: index === 0, ...measured });
   }
@@ -109,7 +118,38 @@ for (const level of report.levels) {
     if (result.f1.mean < own - TARGET_F1_LOSS) faults.push(`${where}: F1 ${result.f1.mean.toFixed(3)}, supersampled ${own.toFixed(3)}`);
   }
 }
+if (options.agree) faults.push(...disagreements(JSON.parse(readFileSync(options.agree, 'utf8'))));
 report.faults = faults;
+
+/** Where our raster, as a client, is too far from three.js; says what it compared. */
+function disagreements(ours) {
+  const found = [];
+  let count = 0;
+  for (const level of report.levels) {
+    const named = [ours.original, ...ours.levels].find((l) => l.file === basename(level.file));
+    for (const three of level.results.filter((r) => r.mode === 'client')) {
+      const client = named?.sizes.find((s) => s.height_px === three.height_px)?.client;
+      if (!client) continue;
+      const where = `${basename(level.file)} at ${three.height_px} px`;
+      const parts = [];
+      for (const key of ['precision', 'recall']) {
+        const [a, b] = [client[key].mean, three[key].mean];
+        parts.push(`${key} ${a.toFixed(4)} / ${b.toFixed(4)}`);
+        if (!(Math.abs(a - b) <= AGREE_SILHOUETTE)) found.push(`${where}: ${key} ${a.toFixed(3)}, three.js ${b.toFixed(3)}`);
+      }
+      const theirs = meanLight(find(level, 'unlit', three.height_px).views);
+      const colour = client.base_color_linear ?? [];
+      const most = Math.max(...theirs);
+      const off = Math.max(...theirs.map((t, c) => Math.abs(t - colour[c]) / most));
+      parts.push(`base colour ${(100 * off).toFixed(2)} % off`);
+      if (!(off <= AGREE_COLOUR)) found.push(`${where}: base colour ${colour.map((c) => c.toFixed(4))}, three.js ${theirs.map((c) => c.toFixed(4))}`);
+      console.error(`agree: ${where}: ${parts.join(', ')}`);
+      count += 1;
+    }
+  }
+  if (count === 0) found.push(`${options.agree}: no file and height in common`);
+  return found;
+}
 
 const fixed = (pair) => `${pair.mean.toFixed(3)} / ${pair.worst.toFixed(3)}`;
 console.error(`three.js ${report.three}, ${report.samples} samples, ${views.length} views; mean / worst view`);
