@@ -77,6 +77,7 @@ const REPORT_OFFSET_DEG: f32 = 11.0;
 pub fn bake(request: &Request, watch: &dyn Watch) -> Result<Baked> {
     check(&request.recipe)?;
     check(&request.scene)?;
+    request.recipe.packer.check()?;
     let package = Package::start(&request.output, request.force)?;
     begin(watch, "load", 1)?;
     // Read once: what is described is what is baked, even if the file changes meanwhile.

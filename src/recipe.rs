@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::botany::recognise::OrganRule;
+use crate::error::{Error, Result};
 use crate::knobs::{Knobs, Range};
 
 /// Where a recipe starts from.
@@ -30,6 +31,33 @@ pub enum Method {
     CrossedQuads,
 }
 
+/// How cards share an atlas page.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Packer {
+    /// In rectangles, two triangles each.
+    #[default]
+    Rectangles,
+    /// By their trimmed outlines, with xatlas; only in builds with the feature `xatlas`.
+    Outlines,
+}
+
+impl Packer {
+    /// Whether this build has it.
+    ///
+    /// # Errors
+    /// [`Error::Usage`].
+    pub fn check(self) -> Result<()> {
+        match self {
+            Self::Outlines if cfg!(not(feature = "xatlas")) => Err(Error::usage(
+                "recipe: packer is Outlines, but this build of pleach can't pack outlines",
+                "build with `--features xatlas` (needs libclang; Debian: libclang-dev), \
+                 or take Rectangles",
+            )),
+            _ => Ok(()),
+        }
+    }
+}
+
 /// A billboard beside the plane that the adaptive loop may choose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Billboard {
@@ -52,6 +80,8 @@ pub struct Recipe {
     pub texel_density: f32,
     /// Transparent texels around each card, 0 to 16.
     pub gutter_texels: f32,
+    /// How cards share an atlas page; outlines need a build with the feature `xatlas`.
+    pub packer: Packer,
     /// Sub-samples a texel along each axis, 1 to 8.
     pub samples: u32,
     /// Rounds in which texels are fitted to the original's silhouettes; 0 leaves them as projected.
@@ -157,6 +187,7 @@ impl Recipe {
             reassign_rounds: 12,
             texel_density: 1.0,
             gutter_texels: 1.0,
+            packer: Packer::Rectangles,
             samples: 4,
             refine_rounds: 6,
             training_views: 24,
@@ -168,5 +199,24 @@ impl Recipe {
             tolerance: 0.2,
             memory_mib: 0,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[cfg(not(feature = "xatlas"))]
+    #[test]
+    fn a_packer_that_the_build_lacks_is_refused() {
+        let error = Packer::Outlines.check().unwrap_err();
+        assert_eq!(error.exit_code(), 2);
+        assert!(error.to_string().contains("--features xatlas"), "{error}");
+    }
+
+    #[test]
+    fn a_packer_that_the_build_has_is_accepted() {
+        assert!(Packer::Rectangles.check().is_ok());
+        assert_eq!(Packer::Outlines.check().is_ok(), cfg!(feature = "xatlas"));
     }
 }

@@ -1,12 +1,26 @@
 //! Charts: where each card lies in texel space.
 //!
-//! A triangular card is sheared to a right triangle, so that two of them share one rectangle of
-//! the atlas; the corner that is nearest to a right angle keeps the shear small. Every chart has a
+//! For the rectangle packer a triangular card is sheared to a right triangle, so that two of them
+//! share one rectangle of the atlas; the corner that is nearest to a right angle keeps the shear
+//! small. Where all angles are far from it (slivers), a rectangle of its own is smaller. A packer
+//! of outlines ([`Chart::placed`]) leaves cards in their shape and turns them. Every chart has a
 //! gutter around its outline, in texels, so that neighbours do not bleed into each other.
 
 use glam::{Vec2, Vec3};
 
 use crate::cloud::card::Card;
+use crate::space::hull;
+
+/// Which texels of its rectangle belong to a chart.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Shape {
+    /// All.
+    Whole,
+    /// Those with x/w + y/h < 1: two such charts share a rectangle.
+    Half,
+    /// Those that are marked, row by row.
+    Mask(Vec<bool>),
+}
 
 /// A card's place in texel space.
 #[derive(Clone, Debug)]
@@ -27,8 +41,8 @@ pub struct Chart {
     pub base: Vec2,
     /// Local size in texels.
     pub size: [u32; 2],
-    /// True where only the texels with x/w + y/h < 1 belong to the chart.
-    pub half: bool,
+    /// Which of its texels belong to the chart.
+    pub shape: Shape,
     /// Upper left texel in the atlas.
     pub place: [u32; 2],
     /// True where the chart lies turned by 180 degrees in its rectangle.
@@ -38,10 +52,16 @@ pub struct Chart {
 impl Chart {
     /// Lays out a card at `density` texels a normalised unit with a gutter of `pad` texels.
     pub fn new(card: &Card, density: f32, pad: f32) -> Self {
-        if card.outline.len() == 3 {
-            Self::triangle(card, density, pad)
+        let whole = Self::rectangle(card, density, pad);
+        if card.outline.len() != 3 {
+            return whole;
+        }
+        let half = Self::triangle(card, density, pad);
+        let texels = |chart: &Self| chart.size[0] * chart.size[1];
+        if texels(&half) < 2 * texels(&whole) {
+            half
         } else {
-            Self::rectangle(card, density, pad)
+            whole
         }
     }
 
@@ -65,19 +85,24 @@ impl Chart {
         let (w, h) = (texels(a - c), texels(b - c));
         // Gutter of a right triangle: both legs and the hypotenuse move out by `pad`.
         let slope = (1.0 / (w * w) + 1.0 / (h * h)).sqrt();
-        let half_w = (pad + w * (1.0 + pad * slope + pad / h)).ceil() + 1.0;
-        let half_h = (pad + h * (1.0 + pad * slope + pad / w)).ceil() + 1.0;
-        let (full_w, full_h) = ((w + 2.0 * pad).ceil(), (h + 2.0 * pad).ceil());
-        let half = half_w * half_h < 2.0 * full_w * full_h;
-        let size = if half {
-            [half_w as u32, half_h as u32]
-        } else {
-            [full_w as u32, full_h as u32]
-        };
-        Self::affine(card, c, a - c, b - c, [w, h], Vec2::splat(pad), size, half)
+        let size = [
+            (pad + w * (1.0 + pad * slope + pad / h)).ceil() as u32 + 1,
+            (pad + h * (1.0 + pad * slope + pad / w)).ceil() as u32 + 1,
+        ];
+        Self::affine(
+            card,
+            c,
+            a - c,
+            b - c,
+            [w, h],
+            Vec2::splat(pad),
+            size,
+            Shape::Half,
+        )
     }
 
-    fn rectangle(card: &Card, density: f32, pad: f32) -> Self {
+    /// The chart of the card's bounding rectangle along its longest edge.
+    pub fn rectangle(card: &Card, density: f32, pad: f32) -> Self {
         let o = &card.outline;
         let (mut low, mut high) = (Vec2::MAX, Vec2::MIN);
         // The longer edge direction of the outline is the rectangle's x.
@@ -111,7 +136,7 @@ impl Chart {
             legs,
             Vec2::splat(pad),
             size,
-            false,
+            Shape::Whole,
         )
     }
 
@@ -128,7 +153,7 @@ impl Chart {
         legs: [f32; 2],
         base: Vec2,
         size: [u32; 2],
-        half: bool,
+        shape: Shape,
     ) -> Self {
         let determinant = a.perp_dot(b);
         let determinant = if determinant.abs() < 1e-30 {
@@ -149,9 +174,44 @@ impl Chart {
             to_y: in_space(t),
             base,
             size,
-            half,
+            shape,
             place: [0, 0],
             turned: false,
+        }
+    }
+
+    /// The chart of a card whose corners a packer has put at `corners`, in texels of a page of the
+    /// given size, affinely; it owns the texels within `pad` of its outline.
+    pub fn placed(card: &Card, corners: &[Vec2], pad: f32, page: [u32; 2]) -> Self {
+        let page = Vec2::new(page[0] as f32, page[1] as f32);
+        let low = corners.iter().fold(page, |m, &c| m.min(c)) - pad;
+        let high = corners.iter().fold(Vec2::ZERO, |m, &c| m.max(c)) + pad;
+        let (low, high) = (low.floor().max(Vec2::ZERO), high.ceil().min(page));
+        let [w, h] = [(high.x - low.x) as u32, (high.y - low.y) as u32];
+        let mut outline: Vec<Vec2> = corners.iter().map(|&c| c - low).collect();
+        let base = outline[0];
+        let (p, q) = (outline[1] - base, outline[2] - base);
+        let [o, a, b] = [0, 1, 2].map(|i| card.outline[i]);
+        let (a, b) = (a - o, b - o);
+        if p.perp_dot(q) < 0.0 {
+            outline.reverse();
+        }
+        let owned = (0..w * h).map(|i| {
+            let center = Vec2::new((i % w) as f32 + 0.5, (i / w) as f32 + 0.5);
+            hull::distance(&outline, center) < pad + 0.499
+        });
+        let owned = owned.collect();
+        // On the card, where texel x grows and y stays: weights of a and b that cancel y.
+        let (x, y) = (Vec2::new(p.x, q.x), Vec2::new(p.y, q.y));
+        let along = (a * y.y - b * y.x) * x.perp_dot(y).signum();
+        let in_space = |d: Vec2| card.u * d.x + card.v * d.y;
+        let unit = Self::affine(card, o, a, b, [1.0, 1.0], base, [w, h], Shape::Mask(owned));
+        Self {
+            tangent: in_space(along.normalize_or(Vec2::X)),
+            to_x: unit.to_x * x.x + unit.to_y * x.y,
+            to_y: unit.to_x * y.x + unit.to_y * y.y,
+            place: [low.x as u32, low.y as u32],
+            ..unit
         }
     }
 
@@ -163,8 +223,12 @@ impl Chart {
 
     /// Whether the local texel (x, y) belongs to this chart.
     pub fn owns(&self, x: u32, y: u32) -> bool {
-        let (w, h) = (self.size[0] as f32, self.size[1] as f32);
-        !self.half || (x as f32 + 0.5) / w + (y as f32 + 0.5) / h < 1.0
+        let [w, h] = self.size;
+        match &self.shape {
+            Shape::Whole => true,
+            Shape::Half => (x as f32 + 0.5) / w as f32 + (y as f32 + 0.5) / (h as f32) < 1.0,
+            Shape::Mask(owned) => owned[(y * w + x) as usize],
+        }
     }
 
     /// How many texels of each row belong to the chart; they are the first ones.

@@ -3,7 +3,7 @@
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
-use super::atlas;
+use super::atlas::{Layout, lay_out};
 use super::chart::Chart;
 use super::edge::bleed;
 use super::project::project;
@@ -25,10 +25,8 @@ pub struct CardGroup {
 /// How cards are baked.
 #[derive(Clone, Copy, Debug)]
 pub struct BakeOptions {
-    /// Texels a normalised unit.
-    pub density: f32,
-    /// Gutter on each side of a chart, texels.
-    pub pad: f32,
+    /// Where cards lie on the page.
+    pub layout: Layout,
     /// Sub-samples a texel along each axis.
     pub samples: u32,
 }
@@ -52,20 +50,10 @@ pub struct Foliage {
 const BATCH: usize = 256;
 
 impl Foliage {
-    /// Lays out, packs and projects all cards. Where they don't fit on the largest page, the
-    /// density falls until they do.
+    /// Lays out and projects all cards.
     pub fn bake(model: &Model, groups: &[CardGroup], options: BakeOptions) -> Self {
-        let mut density = options.density;
-        let (mut charts, size) = loop {
-            let mut charts: Vec<Chart> = groups
-                .par_iter()
-                .map(|g| Chart::new(&g.card, density, options.pad))
-                .collect();
-            match atlas::pack(&mut charts) {
-                Some(size) => break (charts, size),
-                None => density *= 0.8,
-            }
-        };
+        let cards: Vec<&Card> = groups.iter().map(|g| &g.card).collect();
+        let (mut charts, size) = lay_out(&cards, options.layout);
         let mut texels = vec![Stored::default(); (size[0] * size[1]) as usize];
         let mut owned = vec![false; texels.len()];
         // Some cards at a time: projections are several times as large as what is kept of them.

@@ -260,8 +260,10 @@ mod tests {
     use super::*;
     use crate::botany::model::Model;
     use crate::cloud::card::Card;
+    use crate::export::atlas::Layout;
     use crate::export::foliage::{BakeOptions, CardGroup};
     use crate::export::original::camera;
+    use crate::recipe::Packer;
     use crate::space::directions::direction;
 
     /// A card of 64 x 64 texels of which a share scores high, in clumps.
@@ -272,8 +274,11 @@ mod tests {
             triangles: Vec::new(),
         };
         let options = BakeOptions {
-            density: 64.0,
-            pad: 1.0,
+            layout: Layout {
+                density: 64.0,
+                pad: 1.0,
+                packer: Packer::Rectangles,
+            },
             samples: 1,
         };
         let foliage = Foliage::bake(&Model::default(), &[group], options);

@@ -17,3 +17,5 @@ pub mod refine;
 pub mod surface;
 pub mod tangent;
 pub mod texel;
+#[cfg(feature = "xatlas")]
+pub mod xatlas;

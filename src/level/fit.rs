@@ -5,6 +5,7 @@ use glam::Vec2;
 use super::{Baker, Level, LevelRequest, WHOLE_TREE_TRIANGLES};
 use crate::detail::level::LevelPlan;
 use crate::error::Result;
+use crate::export::atlas::Layout;
 use crate::export::foliage::{BakeOptions, Foliage};
 use crate::export::matching::{AreaGoal, CONTRAST_GUESS, LevelScene, Matched, match_area};
 use crate::export::mip::shrink;
@@ -57,8 +58,11 @@ impl Baker<'_> {
             &self.tree.model,
             &plan.cards,
             BakeOptions {
-                density,
-                pad: self.recipe.gutter_texels,
+                layout: Layout {
+                    density,
+                    pad: self.recipe.gutter_texels,
+                    packer: self.recipe.packer,
+                },
                 samples: self.recipe.samples,
             },
         );
