@@ -102,7 +102,8 @@ fn a_spoiled_manifest_is_refused_by_its_field() {
         assert!(message.contains("line "), "{message}");
     }
     let last = good.subtrees.len() - 1;
-    let cases: [(&str, &dyn Fn(&mut Manifest)); 9] = [
+    type Spoil<'a> = (&'a str, &'a dyn Fn(&mut Manifest));
+    let cases: [Spoil; 9] = [
         ("radius_m", &|m| m.subtrees[last].radius_m = f32::NAN),
         ("connector", &|m| m.subtrees[1].connector[2] = f32::INFINITY),
         ("optimal_distance_m", &|m| {

@@ -47,8 +47,9 @@ pub(super) struct Clock {
 const LONG_PATH: f32 = 4096.0;
 
 impl Clock {
-    /// Moves on to a view; whether everything has to be looked at.
-    pub fn tick(&mut self, view: &View, epoch: u64) -> bool {
+    /// Moves on to a view; whether everything has to be looked at, and whether what was asked for its
+    /// occlusion has.
+    pub fn tick(&mut self, view: &View, epoch: u64) -> (bool, bool) {
         let step = match self.last {
             Some(last) if last.sees() == view.sees() && last.zoom == view.zoom => {
                 last.eye.distance(view.eye)
@@ -56,10 +57,11 @@ impl Clock {
             _ => f32::INFINITY,
         };
         let path = self.path + step * 1.000_001;
-        let all = epoch != self.epoch || (view.sees() && path.is_nan()) || path > LONG_PATH;
+        let all = (view.sees() && path.is_nan()) || path > LONG_PATH;
+        let hidden = epoch != self.epoch;
         (self.last, self.epoch) = (Some(*view), epoch);
         self.path = if all { 0.0 } else { path };
-        all
+        (all, hidden)
     }
 }
 
@@ -74,9 +76,12 @@ pub(super) struct Looking<'a, V> {
     pub zoom: Option<f32>,
     pub path: f32,
     pub looked_at: u32,
+    /// Whether the occlusion of any node was asked for.
+    pub asked: bool,
 }
 
 impl<'a, V: Visibility> Looking<'a, V> {
+    #[inline]
     pub fn new(
         hierarchy: &'a Hierarchy,
         visibility: &'a mut V,
@@ -92,10 +97,12 @@ impl<'a, V: Visibility> Looking<'a, V> {
             zoom: view.sees().then_some(view.zoom),
             path,
             looked_at: 0,
+            asked: false,
         }
     }
 
     /// Whether a node is open, and the length of the path until which that is sure.
+    #[inline]
     pub fn look(&mut self, node: u32) -> (bool, f32) {
         self.looked_at += 1;
         let Some(zoom) = self.zoom else {
@@ -105,6 +112,7 @@ impl<'a, V: Visibility> Looking<'a, V> {
         let sight = self.visibility.sight(at, node, self.eye, self.place);
         let mut switch = sight.visibility * at.switch_distance * zoom;
         if sight.distance < switch {
+            self.asked = true;
             switch *= 1.0 - self.visibility.occlusion(at, self.place);
         }
         // Rounding: what is as near as this to its switch is looked at in every frame.
@@ -114,6 +122,7 @@ impl<'a, V: Visibility> Looking<'a, V> {
     }
 
     /// How far a node is on its way to be drawn as a whole: 1 at its switch distance.
+    #[inline]
     fn nearness(&mut self, node: u32) -> f32 {
         let at = &self.hierarchy.nodes()[node as usize];
         let sight = self.visibility.sight(at, node, self.eye, self.place);
@@ -123,6 +132,7 @@ impl<'a, V: Visibility> Looking<'a, V> {
 
     /// Looks again at the nodes of a list that are due (or `all`); `None` where one of them changed.
     /// Else the path at which the first is due again.
+    #[inline]
     pub fn still(&mut self, nodes: &[u32], dues: &mut [f32]) -> Option<f32> {
         let mut first = f32::INFINITY;
         for (&node, due) in nodes.iter().zip(dues) {
@@ -201,8 +211,16 @@ impl<'a, V: Visibility> Looking<'a, V> {
 
     /// Writes what is drawn; `fade` is the share of its switch distance over which a node fades in
     /// over its children.
-    pub fn collect(&mut self, tree: u32, nodes: &[u32], fade: f32, out: &mut Vec<Drawn>) {
-        for &node in nodes {
+    #[inline]
+    pub fn collect(
+        &mut self,
+        tree: u32,
+        nodes: &[u32],
+        dues: &[f32],
+        fade: f32,
+        out: &mut Vec<Drawn>,
+    ) {
+        for (&node, &due) in nodes.iter().zip(dues) {
             let index = node & !OPEN;
             let drawn = |form, fade| Drawn {
                 tree,
@@ -214,10 +232,13 @@ impl<'a, V: Visibility> Looking<'a, V> {
                 out.push(drawn(Form::Billboard, 1.0));
                 continue;
             }
-            if self.hierarchy.is_tip(index) {
+            let at = &self.hierarchy.nodes()[index as usize];
+            if at.end == index + 1 {
                 out.push(drawn(Form::Geometry, 1.0));
             }
-            if fade > 0.0 {
+            // What can't close before the eye has come this far has not begun to fade.
+            let zone = fade * at.switch_distance * self.zoom.unwrap_or(0.0) * self.place.scale;
+            if fade > 0.0 && due - self.path < zone {
                 let share = (self.nearness(index) - (1.0 - fade)) / fade;
                 if share > 0.0 {
                     out.push(drawn(Form::Billboard, share.min(1.0)));
@@ -262,8 +283,8 @@ impl<V: Visibility> ActiveCut<V> {
     /// Follows the camera.
     pub fn update(&mut self, view: &View) -> Changes {
         let epoch = self.visibility.epoch(view.eye);
-        let all = self.clock.tick(view, epoch);
-        let path = self.clock.path;
+        let (all, hidden) = self.clock.tick(view, epoch);
+        let (all, path) = (all || hidden, self.clock.path);
         let mut looking = Looking::new(
             &self.hierarchy,
             &mut self.visibility,
@@ -287,17 +308,18 @@ impl<V: Visibility> ActiveCut<V> {
         changes
     }
 
-    /// Appends what is drawn; see [`Drawn`]. `fade` is the share of its switch distance over which
+    /// Appends what is drawn, seen from where the cut was last updated; see [`Drawn`]. `fade` is the share of its switch distance over which
     /// a node fades in over its children; 0 for none.
     pub fn collect(&mut self, view: &View, fade: f32, out: &mut Vec<Drawn>) {
+        let path = self.clock.path;
         let mut looking = Looking::new(
             &self.hierarchy,
             &mut self.visibility,
             &self.place,
             view,
-            0.0,
+            path,
         );
-        looking.collect(0, &self.nodes, fade, out);
+        looking.collect(0, &self.nodes, &self.dues, fade, out);
     }
 
     /// The tree.

@@ -40,6 +40,7 @@ impl Cells {
     }
 
     /// Cells along each side.
+    #[inline]
     pub fn count(&self) -> IVec3 {
         self.count
     }
@@ -73,12 +74,14 @@ impl Cells {
     }
 
     /// Where a cell is in [`Cells::solidity`]; `None` outside.
+    #[inline]
     pub fn index(&self, cell: IVec3) -> Option<usize> {
         let inside = cell.cmpge(IVec3::ZERO).all() && cell.cmplt(self.count).all();
         inside.then(|| ((cell.z * self.count.y + cell.y) * self.count.x + cell.x) as usize)
     }
 
     /// The cell that a point is in, also outside the grid.
+    #[inline]
     pub fn cell_of(&self, point: Vec3) -> IVec3 {
         ((point - self.low) / self.edge).floor().as_ivec3()
     }

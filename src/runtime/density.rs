@@ -45,6 +45,7 @@ impl Visibility for DotProduct {
     }
 }
 
+#[inline]
 fn scaled(node: &Node, eye: Vec3, strength: f32) -> Sight {
     let from_eye = node.center - eye;
     Sight {

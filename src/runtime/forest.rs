@@ -1,8 +1,10 @@
 //! Many trees: a cut through each, kept by splits and merges between frames.
 
+use glam::Vec4;
+
 use super::active_cut::{Changes, Clock, Looking};
 use super::hierarchy::Hierarchy;
-use super::place::{Place, View};
+use super::place::{Place, Pyramid, View};
 use super::pool::{Pool, Slot};
 use super::visibility::Visibility;
 
@@ -40,6 +42,10 @@ pub struct Forest<V> {
     /// Share of its switch distance over which a node fades in over its children; 0 for none.
     pub fade: f32,
     clock: Clock,
+    /// For each tree its bounding sphere in the world: centre and radius.
+    spheres: Vec<Vec4>,
+    /// For each tree whether its cut rests on what is hidden.
+    asked: Vec<bool>,
     /// For each tree the path at which its first node is due.
     due: Vec<f32>,
     slots: Vec<Slot>,
@@ -61,7 +67,13 @@ impl<V: Visibility> Forest<V> {
             .collect();
         let (pool, slots) = Pool::new(places.len());
         let most = species.iter().map(|s| s.nodes().len()).max().unwrap_or(0);
+        let sphere = |p: &Place| {
+            let (center, radius) = species[p.species as usize].sphere();
+            p.to_world(center).extend(radius * p.scale)
+        };
         Self {
+            spheres: places.iter().map(sphere).collect(),
+            asked: vec![false; places.len()],
             due: vec![0.0; places.len()],
             species,
             places,
@@ -77,12 +89,13 @@ impl<V: Visibility> Forest<V> {
     /// Follows the camera. Allocates only while lists grow to a size that they never had before.
     pub fn update(&mut self, view: &View) -> Changes {
         let epoch = self.visibility.epoch(view.eye);
-        let all = self.clock.tick(view, epoch);
+        let (all, hidden) = self.clock.tick(view, epoch);
         let path = self.clock.path;
         let mut changes = Changes::default();
         for tree in 0..self.due.len() {
-            if all || self.due[tree] <= path {
-                changes += self.refresh(tree, view, path, all);
+            let anew = all || (hidden && self.asked[tree]);
+            if anew || self.due[tree] <= path {
+                changes += self.refresh(tree, view, path, anew);
             }
         }
         changes
@@ -95,6 +108,7 @@ impl<V: Visibility> Forest<V> {
         let (nodes, dues) = (&self.pool.nodes[range.clone()], &mut self.pool.dues[range]);
         if !all && let Some(due) = looking.still(nodes, dues) {
             self.due[tree] = due;
+            self.asked[tree] |= looking.asked;
             return Changes {
                 looked_at: looking.looked_at,
                 ..Changes::default()
@@ -102,6 +116,7 @@ impl<V: Visibility> Forest<V> {
         }
         let (new_nodes, new_dues) = (&mut self.spare.0, &mut self.spare.1);
         let changes = looking.rebuild((nodes, dues), all, (new_nodes, new_dues));
+        self.asked[tree] = looking.asked || (self.asked[tree] && !all);
         self.due[tree] = new_dues.iter().fold(f32::INFINITY, |a, &b| a.min(b));
         self.slots[tree] = self
             .pool
@@ -109,20 +124,33 @@ impl<V: Visibility> Forest<V> {
         changes
     }
 
-    /// Appends what is to be drawn of all trees that may be in the picture, by tree.
+    /// Appends what is to be drawn of all trees that may be in the picture, by tree, seen from where
+    /// the cuts were last updated.
     pub fn collect(&mut self, view: &View, out: &mut Vec<Drawn>) {
         if !view.sees() {
             return;
         }
-        for (tree, (place, &slot)) in self.places.iter().zip(&self.slots).enumerate() {
-            let hierarchy = &self.species[place.species as usize];
-            let (center, radius) = hierarchy.sphere();
-            if !view.meets(place.to_world(center), radius * place.scale) {
+        let (pyramid, path) = (Pyramid::new(view), self.clock.path);
+        for (tree, (&sphere, &slot)) in self.spheres.iter().zip(&self.slots).enumerate() {
+            if !pyramid.meets(sphere.truncate(), sphere.w) {
                 continue;
             }
-            let mut looking = Looking::new(hierarchy, &mut self.visibility, place, view, 0.0);
-            let nodes = &self.pool.nodes[Pool::range(slot)];
-            looking.collect(tree as u32, nodes, self.fade, out);
+            let range = Pool::range(slot);
+            let (nodes, dues) = (&self.pool.nodes[range.clone()], &self.pool.dues[range]);
+            // Most trees are far: one billboard.
+            if let [0] = nodes {
+                out.push(Drawn {
+                    tree: tree as u32,
+                    node: 0,
+                    form: Form::Billboard,
+                    fade: 1.0,
+                });
+                continue;
+            }
+            let place = &self.places[tree];
+            let hierarchy = &self.species[place.species as usize];
+            let mut looking = Looking::new(hierarchy, &mut self.visibility, place, view, path);
+            looking.collect(tree as u32, nodes, dues, self.fade, out);
         }
     }
 

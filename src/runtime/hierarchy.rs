@@ -182,6 +182,7 @@ impl Hierarchy {
     }
 
     /// The nodes; 0 is the whole tree.
+    #[inline]
     pub fn nodes(&self) -> &[Node] {
         &self.nodes
     }
@@ -192,11 +193,13 @@ impl Hierarchy {
     }
 
     /// Bounding sphere of the whole tree: centre and radius.
+    #[inline]
     pub fn sphere(&self) -> (Vec3, f32) {
         (self.center, self.radius)
     }
 
     /// Whether nothing is under a node.
+    #[inline]
     pub fn is_tip(&self, node: u32) -> bool {
         self.nodes[node as usize].end == node + 1
     }

@@ -96,6 +96,7 @@ impl<'g> Occlusion<'g> {
 
     /// Probability that what is in a point's cell is hidden from the eye, 0 to 1. A point outside
     /// the grid is treated as the nearest cell's.
+    #[inline]
     pub fn probability(&mut self, point: Vec3) -> f32 {
         let last = self.cells.count() - 1;
         let cell = self.cells.cell_of(point).clamp(IVec3::ZERO, last);

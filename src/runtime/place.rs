@@ -27,6 +27,7 @@ impl Place {
     }
 
     /// A point of the tree in the world.
+    #[inline]
     pub fn to_world(&self, p: Vec3) -> Vec3 {
         let (cos, sin) = (self.turn.x, self.turn.y);
         let turned = Vec3::new(p.x * cos + p.z * sin, p.y, p.z * cos - p.x * sin);
@@ -34,6 +35,7 @@ impl Place {
     }
 
     /// A point of the world in the tree's own space.
+    #[inline]
     pub fn to_local(&self, p: Vec3) -> Vec3 {
         let p = (p - self.position) / self.scale;
         let (cos, sin) = (self.turn.x, self.turn.y);
@@ -86,15 +88,39 @@ impl View {
 
     /// Whether any of a sphere may be in the picture.
     pub fn meets(&self, center: Vec3, radius: f32) -> bool {
+        Pyramid::new(self).meets(center, radius)
+    }
+}
+
+/// What a camera sees: a pyramid without an end.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Pyramid {
+    eye: Vec3,
+    forward: Vec3,
+    /// Unit normals of the sides: `aside * x - depth * y`, where x and y are the parts of these.
+    sides: [(Vec3, Vec2); 2],
+}
+
+impl Pyramid {
+    pub fn new(view: &View) -> Self {
+        let side = |axis: Vec3, tan: f32| (axis, Vec2::new(1.0, tan) / (1.0 + tan * tan).sqrt());
+        Self {
+            eye: view.eye,
+            forward: view.forward,
+            sides: [
+                side(view.right, view.half.x),
+                side(view.right.cross(view.forward), view.half.y),
+            ],
+        }
+    }
+
+    /// Whether any of a sphere may be inside.
+    #[inline]
+    pub fn meets(&self, center: Vec3, radius: f32) -> bool {
         let at = center - self.eye;
         let depth = at.dot(self.forward);
-        let up = self.right.cross(self.forward);
-        let aside = Vec2::new(at.dot(self.right).abs(), at.dot(up).abs());
-        // Distance from the side planes of the pyramid, whose normals are not yet unit vectors.
-        let slack = Vec2::ONE + self.half * self.half;
-        depth > -radius
-            && (aside.x - depth * self.half.x) <= radius * slack.x.sqrt()
-            && (aside.y - depth * self.half.y) <= radius * slack.y.sqrt()
+        let outside = |(axis, n): (Vec3, Vec2)| at.dot(axis).abs() * n.x - depth * n.y > radius;
+        depth > -radius && !outside(self.sides[0]) && !outside(self.sides[1])
     }
 }
 

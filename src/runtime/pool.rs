@@ -42,6 +42,7 @@ impl Pool {
         (pool, (0..trees as u32).map(slot).collect())
     }
 
+    #[inline]
     pub fn range(slot: Slot) -> std::ops::Range<usize> {
         slot.start as usize..(slot.start + slot.len) as usize
     }

@@ -19,8 +19,8 @@ pub struct Sight {
 
 /// An estimator of visibility.
 ///
-/// Visibility and occlusion may only change with [`Visibility::epoch`], unless `rate` is infinite: that lets a
-/// cut leave alone what can't have changed, and still be the same as a cut made anew.
+/// A sight may only change as its `rate` says, and an occlusion only with [`Visibility::epoch`]: that
+/// lets a cut leave alone what can't have changed, and still be the same as a cut made anew.
 pub trait Visibility {
     /// How a node of a tree at `place` is seen by an eye, given in the tree's own space.
     fn sight(&mut self, node: &Node, index: u32, eye: Vec3, place: &Place) -> Sight;
@@ -33,7 +33,7 @@ pub trait Visibility {
         0.0
     }
 
-    /// A number that changes when visibilities may have; asked once a frame, before everything else.
+    /// A number that changes when occlusions may have; asked once a frame, before everything else.
     fn epoch(&mut self, eye: Vec3) -> u64 {
         let _ = eye;
         0

@@ -92,6 +92,9 @@ pub fn study(tree: Species, settings: &Settings) -> Result<Study> {
     })
 }
 
+/// One frame: all leaves and every way, and each way's F1 and share of the right tree.
+type Looked = (Vec<Frame>, Vec<(f64, f64)>);
+
 /// Every way along a path, and the middle one of the frames: all leaves, then every way.
 fn rows(
     stand: &Stand,
@@ -115,7 +118,7 @@ fn rows(
         stand.walk(density, path, &shown),
         stand.walk(hidden, path, &shown),
     ];
-    let looked: Vec<(Vec<Frame>, Vec<(f64, f64)>)> = shown
+    let looked: Vec<Looked> = shown
         .par_iter()
         .enumerate()
         .map(|(i, &frame)| {
