@@ -78,7 +78,7 @@ pub struct Recipe {
     pub reassign_rounds: u32,
     /// Texels a pixel at the distance where a level starts, 0.25 to 4.
     pub texel_density: f32,
-    /// Transparent texels around each card, 0 to 16.
+    /// Transparent texels around each card at least, 0 to 16; up to 12 where the page has room.
     pub gutter_texels: f32,
     /// How cards share an atlas page; outlines need a build with the feature `xatlas`.
     pub packer: Packer,
