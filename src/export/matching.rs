@@ -291,7 +291,9 @@ mod tests {
                 f32::from(u8::from(on)) + 0.001 * (i * 7919 % 97) as f32
             })
             .collect();
-        (foliage, score, f64::from(wanted) / (64.0 * 64.0))
+        let owned = foliage.owned.iter().filter(|&&o| o).count();
+        // The gutter around the card is owned too: the card's own share is that of all.
+        (foliage, score, f64::from(wanted) / owned as f64)
     }
 
     fn matched(opaque: impl Fn(u32, u32) -> bool) -> Matched {
@@ -300,8 +302,10 @@ mod tests {
             let camera = camera(&direction(0.0, 0.0), pixels);
             (vec![camera], area * f64::from(pixels * pixels))
         };
+        // Sizes at which texels and pixels do not fall on each other, as they never do on a tree: a
+        // mip of two opaque texels in four is the cutoff itself.
         let ((near, near_area), (own, own_area), (far, far_area)) =
-            (seen(320.0), seen(64.0), seen(32.0));
+            (seen(320.0), seen(61.0), seen(30.5));
         let goal = AreaGoal {
             near,
             near_area,
