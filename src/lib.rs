@@ -48,6 +48,8 @@ pub mod study;
 #[cfg(feature = "bake")]
 pub mod sweep;
 #[cfg(feature = "bake")]
+pub mod threads;
+#[cfg(feature = "bake")]
 pub mod watch;
 
 #[cfg(feature = "bake")]

@@ -80,7 +80,7 @@ pub fn bake(request: &Request, watch: &dyn Watch) -> Result<Baked> {
     request.recipe.packer.check()?;
     let package = Package::start(&request.output, request.force)?;
     begin(watch, "load", 1)?;
-    // Read once: what is described is what is baked, even if the file changes meanwhile.
+    // Read once, so that what is described is what is baked (files that it refers to are read twice).
     let input = read(&request.input, &Limits::default())?;
     let provenance = provenance(request, &input)?;
     let model = load_slice(&input, &request.input, &Limits::default())?;

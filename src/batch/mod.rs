@@ -17,7 +17,8 @@ use std::time::Instant;
 use crate::error::{Error, Result};
 use crate::pipeline::{Baked, Request, bake};
 use crate::recipe::Recipe;
-use crate::watch::Watch;
+use crate::threads::pool;
+use crate::watch::{Quiet, Watch};
 pub use memory::{Gate, bytes_of_machine, expected_bytes};
 pub use unchanged::is_unchanged;
 
@@ -116,14 +117,6 @@ fn memory_bytes(recipe: &Recipe) -> u64 {
     }
 }
 
-fn pool(threads: usize) -> Result<rayon::ThreadPool> {
-    let builder = rayon::ThreadPoolBuilder::new().num_threads(threads);
-    builder.build().map_err(|e| Error::Internal {
-        step: "start threads",
-        what: e.to_string(),
-    })
-}
-
 /// The folder of each tree's package.
 fn outputs(batch: &Batch) -> Result<Vec<PathBuf>> {
     let mut taken: std::collections::BTreeMap<String, &Path> = Default::default();
@@ -163,9 +156,9 @@ fn one(batch: &Batch, input: &Path, output: &Path, gate: &Gate, watch: &dyn Watc
     let done = if !batch.rebake && is_unchanged(&request) {
         Done::Unchanged
     } else {
-        let _room = gate.enter(expected_bytes(input));
+        let _room = gate.enter(expected_bytes(&request));
         // Even a fault of ours ends one tree, not the batch.
-        let caught = catch_unwind(AssertUnwindSafe(|| bake(&request, &Inside(watch))));
+        let caught = catch_unwind(AssertUnwindSafe(|| bake(&request, &Quiet(watch))));
         match caught.unwrap_or_else(|panic| Err(fault(&*panic))) {
             Ok(baked) => Done::Baked(Box::new(baked)),
             Err(error) => Done::Failed(error),
@@ -185,14 +178,5 @@ fn fault(panic: &(dyn Any + Send)) -> Error {
     Error::Internal {
         step: "bake",
         what: text.unwrap_or("a panic").into(),
-    }
-}
-
-/// Bakes within a batch say nothing of their stages, since several run at a time.
-struct Inside<'a>(&'a dyn Watch);
-
-impl Watch for Inside<'_> {
-    fn stopped(&self) -> bool {
-        self.0.stopped()
     }
 }

@@ -13,6 +13,7 @@ use crate::pipeline::{Baked, Limit, Request, Wanted, bake, to_json};
 use crate::recipe::{Preset, Recipe};
 use crate::report::schema::{Bake, Level, Report};
 use crate::scene::Scene;
+use crate::threads::pool;
 use crate::watch::Clock;
 
 /// Bake levels of detail of a tree, or of many.
@@ -82,13 +83,7 @@ pub fn run(args: Args) -> Result<()> {
         return batch::run(&batch, args.quiet, args.json);
     }
     let clock = Clock::new(Bars::new(args.quiet));
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(args.threads.into())
-        .build()
-        .map_err(|e| Error::Internal {
-            step: "start threads",
-            what: e.to_string(),
-        })?;
+    let pool = pool(args.threads.into())?;
     let baked = pool.install(|| bake(&request, &clock))?;
     clock.inner().finish();
     let stages = clock.finish();

@@ -9,6 +9,7 @@ use crate::knobs::read;
 use crate::pipeline::{Limit, Wanted};
 use crate::scene::Scene;
 use crate::sweep::{Asked, Sweep, plot, sweep};
+use crate::threads::pool;
 
 /// Measure speed against accuracy: every preset, and each knob alone.
 #[derive(clap::Args, Debug)]
@@ -51,13 +52,7 @@ pub fn run(args: &Args) -> Result<()> {
     };
     catch_ctrl_c()?;
     std::fs::create_dir_all(&args.output).map_err(|e| Error::io(&args.output, "create", e))?;
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(args.threads.into())
-        .build()
-        .map_err(|e| Error::Internal {
-            step: "start threads",
-            what: e.to_string(),
-        })?;
+    let pool = pool(args.threads.into())?;
     let scratch = args.output.join(format!(".sweep-{}", std::process::id()));
     let bars = Bars::new(args.quiet);
     let found = pool.install(|| sweep(&asked, &scratch, &bars));

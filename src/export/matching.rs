@@ -81,7 +81,7 @@ const HIGHEST_CONTRAST: f64 = 120.0;
 /// original covers; the search begins at the contrast `guess`.
 pub fn match_area(
     foliage: &mut Foliage,
-    score: &[f32],
+    mut score: Vec<f32>,
     wood: &[Surface],
     goal: &AreaGoal,
     guess: i32,
@@ -94,11 +94,9 @@ pub fn match_area(
         return found;
     }
     let mut level = LevelScene::new(foliage, wood);
-    let owned_score: Vec<f32> = score
-        .iter()
-        .zip(&foliage.owned)
-        .map(|(&score, &owned)| if owned { score } else { f32::NEG_INFINITY })
-        .collect();
+    for (score, _) in score.iter_mut().zip(&foliage.owned).filter(|(_, o)| !**o) {
+        *score = f32::NEG_INFINITY;
+    }
     let search = Search {
         range: [-HIGHEST_CONTRAST, HIGHEST_CONTRAST],
         guess: guess.into(),
@@ -108,8 +106,8 @@ pub fn match_area(
     };
     search.falling(|contrast| {
         found.contrast = contrast.round() as i32;
-        (found.threshold, found.near_ratio) = level.threshold(&owned_score, found.alphas(), goal);
-        apply(foliage, &owned_score, found);
+        (found.threshold, found.near_ratio) = level.threshold(&score, found.alphas(), goal);
+        apply(foliage, &score, found);
         found.own_ratio = level.client_area(foliage, &goal.own) / goal.own_area.max(1e-9);
         found.far_ratio = level.client_area(foliage, &goal.far) / goal.far_area.max(1e-9);
         1.0 - (found.own_ratio + found.far_ratio) / 2.0
@@ -119,7 +117,8 @@ pub fn match_area(
 
 fn apply(foliage: &mut Foliage, score: &[f32], found: Matched) {
     let [opaque, other] = found.alphas();
-    for (alpha, &score) in foliage.alpha.iter_mut().zip(score) {
+    let texels = foliage.alpha.par_iter_mut().zip(score);
+    texels.for_each(|(alpha, &score)| {
         *alpha = if score >= found.threshold {
             opaque
         } else if score > f32::NEG_INFINITY {
@@ -128,13 +127,13 @@ fn apply(foliage: &mut Foliage, score: &[f32], found: Matched) {
             // Texels of no chart stay empty: they would only bleed into their neighbours' mips.
             0
         };
-    }
+    });
 }
 
 /// The threshold at which as many pixels are covered as `wanted`, and how many are.
 fn at_count(mut critical: Vec<f32>, wanted: f64) -> (f32, usize) {
     let [least, most] = THRESHOLDS;
-    critical.sort_unstable_by(|a, b| b.total_cmp(a));
+    critical.par_sort_unstable_by(|a, b| b.total_cmp(a));
     let covered = |threshold: f32| critical.partition_point(|&c| c >= threshold);
     let index = (wanted.round() as usize).min(critical.len());
     let Some(&last) = critical.get(index.saturating_sub(1)) else {
@@ -314,7 +313,7 @@ mod tests {
             far,
             far_area,
         };
-        match_area(&mut foliage, &score, &[], &goal, CONTRAST_GUESS)
+        match_area(&mut foliage, score, &[], &goal, CONTRAST_GUESS)
     }
 
     /// 0 to 9, alike over 3 x 3 texels.

@@ -79,7 +79,7 @@ fn draw(model: &Model, t: u32, chart: &Chart, samples: f32, [sw, sh]: [u32; 2], 
     if double_area.abs() < 1e-12 {
         return;
     }
-    let alpha = Alpha::of(model, t);
+    let alpha = AlphaTest::of(model, t);
     // Barycentric weights of corners 1 and 2: what they gain from a sample to the next.
     let right = Vec2::new(other.y, -side.y) / double_area;
     let down = Vec2::new(-other.x, side.x) / double_area;
@@ -134,8 +134,8 @@ fn inside(row: Vec2, right: Vec2, [from, to]: [u32; 2]) -> [u32; 2] {
     [first.min(to), last.min(to)]
 }
 
-/// The alpha test of a triangle.
-struct Alpha<'a> {
+/// The alpha test of a triangle, by the nearest texel.
+pub struct AlphaTest<'a> {
     /// `None`: everything passes or nothing does, by `least`.
     image: Option<(&'a Image, [Wrap; 2])>,
     uv: Vec2,
@@ -145,8 +145,9 @@ struct Alpha<'a> {
     least: f32,
 }
 
-impl<'a> Alpha<'a> {
-    fn of(model: &'a Model, t: u32) -> Self {
+impl<'a> AlphaTest<'a> {
+    /// That of triangle `t`.
+    pub fn of(model: &'a Model, t: u32) -> Self {
         let material = model.material_of(t);
         let factor = material.base_color_factor[3];
         // Compared as `alpha / 255 * factor >= cutoff`.
@@ -170,7 +171,8 @@ impl<'a> Alpha<'a> {
         }
     }
 
-    fn passes(&self, weights: Vec2) -> bool {
+    /// Whether the triangle is there at the point with these weights of corners 1 and 2.
+    pub fn passes(&self, weights: Vec2) -> bool {
         let alpha = self.image.map_or(255, |(image, wrap)| {
             let uv = self.uv + self.along[0] * weights.x + self.along[1] * weights.y;
             nearest(image, wrap, uv)[3]

@@ -86,7 +86,7 @@ impl Baker<'_> {
             };
             let score = refine(&foliage, &targets, options);
             part(watch, "match area")?;
-            let matched = match_area(&mut foliage, &score, &wood.surfaces, &goal, guess);
+            let matched = match_area(&mut foliage, score, &wood.surfaces, &goal, guess);
             tries += 1;
             guess = matched.contrast;
             let over = matched.near_ratio;

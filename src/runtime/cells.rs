@@ -67,7 +67,8 @@ impl Cells {
         }
     }
 
-    pub(super) fn set_index(&mut self, index: usize, solidity: f32) {
+    /// As [`Cells::set`], by the place in [`Cells::solidity`].
+    pub(crate) fn set_index(&mut self, index: usize, solidity: f32) {
         let known = if solidity.is_nan() { 0.0 } else { solidity };
         self.solidity[index] = known.clamp(0.0, 1.0);
         self.extinction[index] = -(1.0 - self.solidity[index]).ln();

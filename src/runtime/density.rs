@@ -71,7 +71,7 @@ pub struct Sibling {
 pub fn sibling_density(siblings: &[Sibling]) -> Vec<f32> {
     let density = |a: &Sibling| {
         let within = |b: &&Sibling| a.middle.distance_squared(b.middle) <= a.reach * a.reach;
-        let near = siblings.iter().filter(within).count() - 1;
+        let near = siblings.iter().filter(within).count().saturating_sub(1);
         (near as f32 / a.full.max(1e-6)).min(1.0)
     };
     siblings.iter().map(density).collect()

@@ -82,8 +82,6 @@ impl View {
 
     /// As [`View::camera`], with sides that can be divided into `step` even parts.
     pub fn camera_in_steps(&self, height: f32, height_px: u32, step: u32) -> Camera {
-        // A flat thing has no height to measure; its sphere has.
-        let height = if height > 1e-3 { height } else { 2.0 };
         let pixels_per_unit = height_px as f32 / height;
         // A margin for levels that reach a little beyond the original's sphere.
         let side = ((pixels_per_unit * 2.1).ceil() as u32 + 4).next_multiple_of(2 * step);

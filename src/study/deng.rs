@@ -10,12 +10,14 @@ use std::path::Path;
 use rayon::prelude::*;
 use serde_json::{Value, json};
 
+use super::frame::Frame;
 use super::picture::Sheet;
 use super::scenes::{
-    HEIGHT_PX, TREES, approach, five_species, forest, forest_cells, stand_at, tree_cells, walk,
+    HEIGHT_PX, TREES, approach, five_species, forest, forest_cells, looked_at, stand_at,
+    tree_cells, walk,
 };
 use super::species::Species;
-use super::stand::{Cost, Frame, Stand, Walk};
+use super::stand::{Cost, Stand, Walk};
 use crate::error::Result;
 use crate::report::agreement;
 use crate::runtime::{Cells, Density, DotProduct, Hidden, Law, Occlusion, Plain, View};
@@ -78,17 +80,12 @@ pub fn study(tree: Species, settings: &Settings) -> Result<Study> {
     let cells = forest_cells(&species, &places, CELL_M, None);
     let stand = Stand::new(&species, places);
     let (many, frames) = rows(&stand, &cells, &walk(settings.frames), settings);
-    let (width, height, _) = frames[0].picture();
-    let mut sheet = Sheet::new(1, frames.len(), width, height);
-    for (row, frame) in frames.iter().enumerate() {
-        sheet.put(0, row, &frame.picture().2);
-    }
     Ok(Study {
         scenes: vec![
             (name, 1, one),
             ("forest of five species".into(), TREES, many),
         ],
-        sheet,
+        sheet: Sheet::column(&frames),
     })
 }
 
@@ -102,10 +99,7 @@ fn rows(
     path: &[View],
     settings: &Settings,
 ) -> (Vec<Row>, Vec<Frame>) {
-    let pictures = settings.pictures;
-    let shown: Vec<usize> = (0..pictures)
-        .map(|i| (2 * i + 1) * path.len() / (2 * pictures))
-        .collect();
+    let shown = looked_at(path.len(), settings.pictures);
     let strength = settings.strength;
     let density = Density { strength };
     let hidden = Hidden {

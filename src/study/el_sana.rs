@@ -7,12 +7,14 @@ use std::time::Instant;
 use serde_json::{Value, json};
 
 use super::deng::Settings;
+use super::frame::{Frame, Key};
 use super::picture::Sheet;
 use super::scenes::{
-    HEIGHT_PX, TREES, approach, five_species, forest, forest_cells, stand_at, tree_cells, walk,
+    HEIGHT_PX, TREES, approach, five_species, forest, forest_cells, looked_at, stand_at,
+    tree_cells, walk,
 };
 use super::species::Species;
-use super::stand::{Frame, Key, Stand, Walk};
+use super::stand::{Stand, Walk};
 use crate::error::Result;
 use crate::report::agreement;
 use crate::runtime::{Cells, Hidden, Law, Occlusion, Plain, View};
@@ -79,17 +81,12 @@ pub fn study(tree: Species, settings: &Settings) -> Result<Study> {
         &walk(settings.frames),
         settings,
     );
-    let (width, height, _) = frames[0].picture();
-    let mut sheet = Sheet::new(1, frames.len(), width, height);
-    for (row, frame) in frames.iter().enumerate() {
-        sheet.put(0, row, &frame.picture().2);
-    }
     Ok(Study {
         scenes: vec![
             (name, 1, one),
             ("forest of five species".into(), TREES, many),
         ],
-        sheet,
+        sheet: Sheet::column(&frames),
     })
 }
 
@@ -107,10 +104,7 @@ fn rows(
     path: &[View],
     settings: &Settings,
 ) -> (Vec<Row>, Vec<Frame>) {
-    let pictures = settings.pictures;
-    let shown: Vec<usize> = (0..pictures)
-        .map(|i| (2 * i + 1) * path.len() / (2 * pictures))
-        .collect();
+    let shown = looked_at(path.len(), settings.pictures);
     let views: Vec<&View> = shown.iter().map(|&f| &path[f]).collect();
     let plain = stand.walk(Plain, path, &shown);
     let (frames, draw_ms) = draw(stand, &plain, &views);
@@ -136,10 +130,10 @@ fn rows(
             draw_ms,
         ));
         if out.len() == 3 {
-            kept = drawn.into_iter().nth(pictures / 2);
+            kept = drawn.into_iter().nth(settings.pictures / 2);
         }
     }
-    let first = frames.into_iter().nth(pictures / 2);
+    let first = frames.into_iter().nth(settings.pictures / 2);
     (out, first.into_iter().chain(kept).collect())
 }
 

@@ -9,6 +9,7 @@
 
 pub mod deng;
 pub mod el_sana;
+mod frame;
 pub mod kratt;
 mod leaves;
 pub mod lee;

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::frame::Frame;
 use crate::error::{Error, Result};
 
 /// Pictures of one size in rows, on white.
@@ -22,6 +23,17 @@ impl Sheet {
             rows,
             rgba: vec![255; columns * rows * cell[0] * cell[1] * 4],
         }
+    }
+
+    /// Frames of one size under each other.
+    pub fn column(frames: &[Frame]) -> Self {
+        let pictures: Vec<_> = frames.iter().map(Frame::picture).collect();
+        let (width, height) = pictures.first().map_or((1, 1), |p| (p.0, p.1));
+        let mut sheet = Self::new(1, frames.len().max(1), width, height);
+        for (row, (_, _, rgba)) in pictures.iter().enumerate() {
+            sheet.put(0, row, rgba);
+        }
+        sheet
     }
 
     /// Puts a picture of RGBA bytes into a cell.

@@ -111,6 +111,13 @@ pub fn walk(frames: usize) -> Vec<View> {
         .collect()
 }
 
+/// Frames of a path of which pictures are made: the middles of equal parts.
+pub fn looked_at(frames: usize, pictures: usize) -> Vec<usize> {
+    (0..pictures)
+        .map(|i| (2 * i + 1) * frames / (2 * pictures))
+        .collect()
+}
+
 /// From twelve radii to one and once around a tree that stands at the origin.
 pub fn approach(place: &Place, frames: usize) -> Vec<View> {
     (0..frames)
@@ -156,15 +163,8 @@ pub fn tree_cells(species: &Species, place: &Place, longest: u32, rays: Option<u
     let low = place.to_world(own.low());
     let high = place.to_world(own.low() + own.edge() * own.count().as_vec3());
     let mut cells = Cells::new(low, high, own.count().to_array().map(|c| c as u32));
-    for z in 0..own.count().z {
-        for y in 0..own.count().y {
-            for x in 0..own.count().x {
-                let cell = glam::IVec3::new(x, y, z);
-                if let Some(index) = own.index(cell) {
-                    cells.set(cell, own.solidity()[index]);
-                }
-            }
-        }
+    for (index, &solidity) in own.solidity().iter().enumerate() {
+        cells.set_index(index, solidity);
     }
     cells
 }

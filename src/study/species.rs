@@ -11,7 +11,7 @@ use crate::cloud::plane::{plane, planes};
 use crate::detail::optimal_distance::{aspects, own_triangles};
 use crate::error::{Error, Result};
 use crate::export::chart::Chart;
-use crate::export::project::project;
+use crate::export::project::{AlphaTest, project};
 use crate::report::Drawable;
 use crate::runtime::{Cells, Hierarchy, OwnLeaves, Subtree, by_faces, by_rays};
 use crate::space::raster::{Material, Texture};
@@ -96,28 +96,16 @@ impl Species {
         let low = points().fold(Vec3::MAX, |a, &p| a.min(p));
         let high = points().fold(Vec3::MIN, |a, &p| a.max(p));
         let mut cells = Cells::cubic(low, high, longest);
-        let passes = |t: usize, v: f32, w: f32| opaque(model, t as u32, v, w);
+        let tests: Vec<AlphaTest> = (0..triangles.len() as u32)
+            .map(|t| AlphaTest::of(model, t))
+            .collect();
+        let passes = |t: usize, v: f32, w: f32| tests[t].passes(Vec2::new(v, w));
         match rays {
             None => by_faces(&mut cells, &triangles, passes),
             Some(rays) => by_rays(&mut cells, &triangles, rays, passes),
         }
         cells
     }
-}
-
-/// Whether a model's triangle is there at the point with the given weights of its second and third corner.
-fn opaque(model: &Model, t: u32, v: f32, w: f32) -> bool {
-    let material = model.material_of(t);
-    let cutoff = crate::space::texture::cutoff(material);
-    let Some(texture) = material.base_color.filter(|_| cutoff > 0.0) else {
-        return true;
-    };
-    let [a, b, c] =
-        model.triangles[t as usize].map(|i| model.uvs[texture.uv_set as usize][i as usize]);
-    let uv = a + (b - a) * v + (c - a) * w;
-    let texel =
-        crate::space::texture::nearest(&model.images[texture.image as usize], texture.wrap, uv);
-    f32::from(texel[3]) / 255.0 * material.base_color_factor[3] >= cutoff
 }
 
 fn hierarchy(tree: &Tree, focal_px: f64, texels: u32) -> Result<Hierarchy> {

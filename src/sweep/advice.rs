@@ -1,20 +1,20 @@
 //! What a sweep's figures mean, in sentences.
 
-use super::{BASE, Run};
+use super::Run;
+use super::variants::{BASE, PRESETS};
 
-/// F1 that nobody sees: differences under this are ties (half of the ruler's own noise).
-const TIE: f64 = 0.002;
+/// Differences of F1 under this count as ties.
+const TIE: f64 = 0.003;
 
 /// Presets against the base, and the single knob that buys most time for nothing.
 pub fn advice(runs: &[Run]) -> Vec<String> {
     let Some(base) = runs.iter().find(|r| r.name == BASE) else {
         return Vec::new();
     };
-    let presets = runs
-        .iter()
-        .filter(|r| ["draft", "best"].contains(&r.name.as_str()));
+    let is_preset = |r: &&Run| PRESETS.contains(&r.name.as_str());
+    let presets = runs.iter().filter(|r| is_preset(r) && r.name != BASE);
     let mut out: Vec<String> = presets.map(|run| compare(run, base)).collect();
-    let alone = runs.iter().filter(|r| r.name.contains(' '));
+    let alone = runs.iter().filter(|r| !is_preset(r));
     let free = alone.clone().filter(|r| base.f1_mean - r.f1_mean < TIE);
     let fastest = free.min_by(|a, b| a.seconds.total_cmp(&b.seconds));
     out.extend(match fastest {

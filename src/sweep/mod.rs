@@ -18,7 +18,7 @@ use crate::pipeline::{Request, Wanted, bake};
 use crate::recipe::Recipe;
 use crate::report::schema::{Bake, Report};
 use crate::scene::Scene;
-use crate::watch::{Clock, Watch};
+use crate::watch::{Clock, Quiet, Watch};
 pub use advice::advice;
 pub use plot::plot;
 pub use variants::{BASE, Variant, variants};
@@ -191,15 +191,6 @@ fn mark_front(runs: &mut [Run]) {
         run.on_front = !points
             .iter()
             .any(|&(t, e)| t <= time && e <= error && (t < time || e < error));
-    }
-}
-
-/// Bakes say nothing of their stages.
-struct Quiet<'a>(&'a dyn Watch);
-
-impl Watch for Quiet<'_> {
-    fn stopped(&self) -> bool {
-        self.0.stopped()
     }
 }
 

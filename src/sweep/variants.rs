@@ -14,6 +14,9 @@ pub struct Variant {
 /// The name of the recipe that all others are compared with.
 pub const BASE: &str = "balanced";
 
+/// The names of the presets; all other variants change one knob of the base.
+pub const PRESETS: [&str; 3] = [BASE, "draft", "best"];
+
 /// Presets, then each knob of the balanced preset with its other values.
 pub fn variants() -> Vec<Variant> {
     let preset = |name: &str, preset| Variant {

@@ -32,6 +32,15 @@ pub struct Unwatched;
 
 impl Watch for Unwatched {}
 
+/// A bake within a longer run: says nothing of its stages, and stops when `0` does.
+pub struct Quiet<'a>(pub &'a dyn Watch);
+
+impl Watch for Quiet<'_> {
+    fn stopped(&self) -> bool {
+        self.0.stopped()
+    }
+}
+
 /// Begins a stage, unless the bake should stop.
 ///
 /// # Errors

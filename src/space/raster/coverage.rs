@@ -1,8 +1,7 @@
 //! Which samples a scene hits: alpha without colour or depth, the fast path.
 
-use super::camera::Corner;
-use super::fragment::Fragment;
-use super::triangle::{CENTER, Triangle};
+use super::seen::seen;
+use super::triangle::CENTER;
 use super::{Camera, Sampling, Scene};
 
 /// For every sample, whether anything hits it.
@@ -52,27 +51,16 @@ pub fn coverage_with_stats(scene: &Scene, camera: &Camera, sampling: Sampling) -
     );
     let mut samples = vec![0u8; width as usize * height as usize];
     let mut fragments = 0;
-    for (id, indices) in scene.geometry.triangles.iter().enumerate() {
-        let at: [Corner; 3] = indices.map(|i| corners[i as usize]);
-        if !Triangle::may_hit(&at, CENTER) {
-            continue;
-        }
-        let material = scene.material(id);
-        let Some(triangle) = Triangle::new(at, material.double_sided) else {
-            continue;
-        };
-        // Most leaves of a far tree hit no sample: their texture planes are made on first use.
+    for shown in seen(scene, &corners, CENTER) {
         let mut fragment = None;
-        triangle.scan(width, height, |y, from, to| {
+        shown.triangle.scan(width, height, |y, from, to| {
             fragments += (to - from) as u64;
             let row = y as usize * width as usize;
             let row = &mut samples[row + from as usize..row + to as usize];
-            if material.cutoff.is_none() {
+            if shown.material.cutoff.is_none() {
                 return row.fill(1);
             }
-            let fragment = fragment.get_or_insert_with(|| {
-                Fragment::new(scene, material, indices, &at, &triangle, sampling)
-            });
+            let fragment = fragment.get_or_insert_with(|| shown.fragment(scene, sampling));
             fragment.test_row(y, from, row);
         });
     }

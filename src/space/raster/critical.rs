@@ -5,9 +5,8 @@
 //! which its best fragment needs to pass the alpha test. These values, once known, tell the
 //! covered area at any threshold without drawing again.
 
-use super::camera::Corner;
-use super::fragment::Fragment;
-use super::triangle::{CENTER, Triangle};
+use super::seen::seen;
+use super::triangle::CENTER;
 use super::{Camera, Mips, Sampling, Scene};
 
 /// Scores of the base level's texels, and what alpha they lead to.
@@ -33,25 +32,15 @@ pub fn critical(scene: &Scene, camera: &Camera, scores: Scores) -> Vec<f32> {
     let corners = camera.project(scene.geometry.positions, sampling.side);
     let (width, height) = (camera.width as i32, camera.height as i32);
     let mut pixels = vec![f32::NEG_INFINITY; width as usize * height as usize];
-    for (id, indices) in scene.geometry.triangles.iter().enumerate() {
-        let at: [Corner; 3] = indices.map(|i| corners[i as usize]);
-        if !Triangle::may_hit(&at, CENTER) {
-            continue;
-        }
-        let material = scene.material(id);
-        let Some(triangle) = Triangle::new(at, material.double_sided) else {
-            continue;
-        };
+    for shown in seen(scene, &corners, CENTER) {
         let mut fragment = None;
-        triangle.scan(width, height, |y, from, to| {
+        shown.triangle.scan(width, height, |y, from, to| {
             let row = y as usize * width as usize;
             let row = &mut pixels[row + from as usize..row + to as usize];
-            if material.cutoff.is_none() {
+            if shown.material.cutoff.is_none() {
                 return row.fill(f32::INFINITY);
             }
-            let fragment = fragment.get_or_insert_with(|| {
-                Fragment::new(scene, material, indices, &at, &triangle, sampling)
-            });
+            let fragment = fragment.get_or_insert_with(|| shown.fragment(scene, sampling));
             for (pixel, x) in row.iter_mut().zip(from..) {
                 if let Some((texels, weights)) = fragment.texels(x, y) {
                     let found = scores.critical(texels, weights, *pixel);

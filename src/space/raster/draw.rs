@@ -1,8 +1,7 @@
 //! The nearest triangle of every sample.
 
-use super::camera::Corner;
-use super::fragment::Fragment;
-use super::triangle::{CENTER, Triangle};
+use super::seen::seen;
+use super::triangle::CENTER;
 use super::{Camera, Sampling, Scene};
 
 /// The triangle of a sample that nothing hits.
@@ -34,19 +33,11 @@ pub fn draw(scene: &Scene, camera: &Camera, sampling: Sampling) -> Items {
     let count = width as usize * height as usize;
     let mut near = vec![f32::NEG_INFINITY; count];
     let mut items = vec![EMPTY; count];
-    for (id, indices) in scene.geometry.triangles.iter().enumerate() {
-        let at: [Corner; 3] = indices.map(|i| corners[i as usize]);
-        if !Triangle::may_hit(&at, CENTER) {
-            continue;
-        }
-        let material = scene.material(id);
-        let Some(triangle) = Triangle::new(at, material.double_sided) else {
-            continue;
-        };
+    for shown in seen(scene, &corners, CENTER) {
         let mut fragment = None;
         let mut depth = None;
-        triangle.scan(width, height, |y, from, to| {
-            let depth = depth.get_or_insert_with(|| triangle.near_plane(at));
+        shown.triangle.scan(width, height, |y, from, to| {
+            let depth = depth.get_or_insert_with(|| shown.triangle.near_plane(shown.corners));
             let row = y as usize * width as usize;
             for x in from..to {
                 let sample = row + x as usize;
@@ -54,15 +45,13 @@ pub fn draw(scene: &Scene, camera: &Camera, sampling: Sampling) -> Items {
                 if here <= near[sample] {
                     continue;
                 }
-                let seen = material.cutoff.is_none()
+                let seen = shown.material.cutoff.is_none()
                     || fragment
-                        .get_or_insert_with(|| {
-                            Fragment::new(scene, material, indices, &at, &triangle, sampling)
-                        })
+                        .get_or_insert_with(|| shown.fragment(scene, sampling))
                         .passes(x, y);
                 if seen {
                     near[sample] = here;
-                    items[sample] = id as u32;
+                    items[sample] = shown.id as u32;
                 }
             }
         });

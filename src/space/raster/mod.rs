@@ -27,6 +27,7 @@ mod mips;
 mod msaa;
 mod relief;
 mod row;
+mod seen;
 mod shade;
 mod texture;
 mod triangle;

@@ -4,10 +4,9 @@
 //! the alpha test keeps or discards all samples that the triangle hits there. This is what a page
 //! with three.js shows by default.
 
-use super::camera::{Corner, SUBSAMPLES};
+use super::camera::SUBSAMPLES;
 use super::coverage::Coverage;
-use super::fragment::Fragment;
-use super::triangle::Triangle;
+use super::seen::seen;
 use super::{Camera, Mips, Sampling, Scene};
 
 /// The standard places of four samples, in 16ths of a pixel from its corner (Vulkan 1.3, 26.4
@@ -26,39 +25,31 @@ pub fn coverage_multisampled(scene: &Scene, camera: &Camera) -> Coverage {
     let (width, height) = (camera.width as i32, camera.height as i32);
     let mut hits = vec![0u8; width as usize * height as usize];
     let places = PLACES.map(|(x, y)| [x, y].map(|p| p * SUBSAMPLES / 16));
-    for (id, indices) in scene.geometry.triangles.iter().enumerate() {
-        let at: [Corner; 3] = indices.map(|i| corners[i as usize]);
-        if !Triangle::may_hit(&at, places) {
-            continue;
-        }
-        let material = scene.material(id);
-        let Some(triangle) = Triangle::new(at, material.double_sided) else {
-            continue;
-        };
+    for shown in seen(scene, &corners, places) {
         let mut fragment = None;
-        triangle.scan_places(width, height, places, |y, spans| {
-            let inside = |s: &&(i32, i32)| s.0 < s.1;
-            let from = spans.iter().filter(inside).map(|s| s.0).min().unwrap_or(0);
-            let to = spans.iter().filter(inside).map(|s| s.1).max().unwrap_or(0);
-            for x in from..to {
-                let hit = &mut hits[(y * width + x) as usize];
-                let mut here = 0u8;
-                for (bit, span) in spans.iter().enumerate() {
-                    here |= u8::from(span.0 <= x && x < span.1) << bit;
+        shown
+            .triangle
+            .scan_places(width, height, places, |y, spans| {
+                let inside = |s: &&(i32, i32)| s.0 < s.1;
+                let from = spans.iter().filter(inside).map(|s| s.0).min().unwrap_or(0);
+                let to = spans.iter().filter(inside).map(|s| s.1).max().unwrap_or(0);
+                for x in from..to {
+                    let hit = &mut hits[(y * width + x) as usize];
+                    let mut here = 0u8;
+                    for (bit, span) in spans.iter().enumerate() {
+                        here |= u8::from(span.0 <= x && x < span.1) << bit;
+                    }
+                    // One shading a pixel, as a client does: all its samples share the answer.
+                    let seen = here & !*hit != 0
+                        && (shown.material.cutoff.is_none()
+                            || fragment
+                                .get_or_insert_with(|| shown.fragment(scene, SHADING))
+                                .passes(x, y));
+                    if seen {
+                        *hit |= here;
+                    }
                 }
-                // One shading a pixel, as a client does: all its samples share the answer.
-                let seen = here & !*hit != 0
-                    && (material.cutoff.is_none()
-                        || fragment
-                            .get_or_insert_with(|| {
-                                Fragment::new(scene, material, indices, &at, &triangle, SHADING)
-                            })
-                            .passes(x, y));
-                if seen {
-                    *hit |= here;
-                }
-            }
-        });
+            });
     }
     Coverage {
         width: camera.width,
