@@ -161,29 +161,35 @@ impl<'a> Stand<'a> {
         let (top, least) = (chain[0], chain[chain.len() - 1]);
         let views: Vec<&View> = [self.view].into_iter().chain(&self.next).collect();
         let window = Window::around(self.actors, &views, self.height, top, top / least);
-        let (camera, sampling) = (window.camera(self.view, self.height, top), sampling(top));
-        let originals: Vec<Shot> = sizes(self.actors[0].layers(&camera, sampling), chain)
-            .map(Shot::new)
-            .collect();
+        let drawn = |actor: usize, view: &View| {
+            let camera = window.camera(view, self.height, top);
+            sizes(self.actors[actor].layers(&camera, sampling(top)), chain)
+        };
+        let originals: Vec<Shot> = drawn(0, self.view).map(Shot::new).collect();
+        // A frame later: like with like, so the smaller sizes are made of the largest here, too.
+        let starts = self.asked.starts_px.iter().any(|px| chain.contains(px));
+        let next = self.next.as_ref().filter(|_| starts);
+        let originals_next: Vec<Layers> = next.iter().flat_map(|view| drawn(0, view)).collect();
         // The level before at the size where the present one takes over.
         let mut before: Option<Shot> = None;
         for index in 0..out.len() {
-            let layers = sizes(self.actors[index + 1].layers(&camera, sampling), chain);
             let mut kept = None;
-            for ((shot, original), &height_px) in layers.map(Shot::new).zip(&originals).zip(chain) {
+            let layers = drawn(index + 1, self.view).map(Shot::new);
+            for (step, (shot, &height_px)) in layers.zip(chain).enumerate() {
                 if self.asked.heights_px[index].contains(&height_px) {
-                    let look = original.compare(&shot, &self.view.name, self.height.into());
+                    let look = self.compare(&originals[step], &shot);
                     out[index].sizes.push((height_px, look));
                 }
-                let next = self.asked.starts_px.get(index + 1);
-                if next == Some(&height_px) {
+                if self.asked.starts_px.get(index + 1) == Some(&height_px) {
                     kept = Some(shot.clone());
                 }
                 if self.asked.starts_px[index] == height_px {
-                    let window = window.smaller(top / height_px);
-                    // The largest size of a chain has just been drawn as it is wanted.
-                    let now = (height_px == top).then_some([&shot, original]);
-                    out[index].orbit = self.orbit(index, window, height_px, now);
+                    let level_next = next.and_then(|view| drawn(index + 1, view).nth(step));
+                    let both = level_next.zip(originals_next.get(step).cloned());
+                    out[index].orbit = both.map(|(level, original)| {
+                        let change = |now: &Shot, then| self.compare(now, &Shot::new(then));
+                        [change(&shot, level), change(&originals[step], original)]
+                    });
                     if let Some(before) = &before {
                         out[index - 1].jump = Some(self.leap(before, &shot));
                     }
@@ -191,6 +197,10 @@ impl<'a> Stand<'a> {
             }
             before = kept;
         }
+    }
+
+    fn compare(&self, before: &Shot, after: &Shot) -> ViewAppearance {
+        before.compare(after, &self.view.name, self.height.into())
     }
 
     fn leap(&self, before: &Shot, after: &Shot) -> Leap {
@@ -202,34 +212,8 @@ impl<'a> Stand<'a> {
         Leap {
             f1: agreement(&a, &b).f1(),
             area_ratio: ratio(b.area(), a.area()),
-            look: before.compare(after, &self.view.name, self.height.into()),
+            look: self.compare(before, after),
         }
-    }
-
-    /// How a level and its original change to the next frame.
-    fn orbit(
-        &self,
-        level: usize,
-        window: Window,
-        height_px: u32,
-        now: Option<[&Shot; 2]>,
-    ) -> Option<[ViewAppearance; 2]> {
-        let next = self.next.as_ref()?;
-        let sampling = sampling(height_px);
-        let drawn = |actor: usize, view: &View| {
-            let camera = window.camera(view, self.height, height_px);
-            Shot::new(self.actors[actor].layers(&camera, sampling))
-        };
-        let change = |actor: usize, now: Option<&Shot>| {
-            let then = drawn(actor, next);
-            let (name, height) = (&self.view.name, f64::from(self.height));
-            match now {
-                Some(now) => now.compare(&then, name, height),
-                None => drawn(actor, self.view).compare(&then, name, height),
-            }
-        };
-        let [level_now, original_now] = [0, 1].map(|i| now.map(|n| n[i]));
-        Some([change(level + 1, level_now), change(0, original_now)])
     }
 }
 

@@ -7,7 +7,7 @@ use super::base_color::base_color;
 use super::cost::{draw_calls, texture_bytes};
 use super::drawable::Drawable;
 use super::reference::Reference;
-use super::schema::{Level, Report, SizeFigures};
+use super::schema::{Level, Report};
 use crate::botany::Model;
 use crate::space::raster::{Sampling, coverage_with_stats};
 use crate::space::view::{DEFAULT_VIEWS, ELEVATIONS, View, views_at};
@@ -109,15 +109,28 @@ pub fn evaluate(
             .copied()
             .collect(),
     );
-    for height_px in all {
-        let reference = Reference::of(&drawables[0], original.0, &views, height_px);
+    for chain in Reference::chains(&drawables[0], original.0, &views, &all) {
         for (index, (row, drawable)) in rows.iter_mut().zip(&drawables).enumerate() {
-            if index > 0 && !heights[index - 1].contains(&height_px) {
+            let level = index.checked_sub(1);
+            let asked = |px: u32| level.is_none_or(|level| heights[level].contains(&px));
+            if !chain.iter().any(|r| asked(r.height_px())) {
                 continue;
             }
-            row.sizes
-                .push(measure(&reference, drawable, settings.client));
+            let figures = match level {
+                None => chain.iter().map(Reference::compare_itself).collect(),
+                Some(_) => Reference::compare_chain(&chain, drawable),
+            };
+            for (reference, mut figures) in chain.iter().zip(figures) {
+                if asked(reference.height_px()) {
+                    let client = || Box::new(reference.compare_client(drawable));
+                    figures.client = settings.client.then(client);
+                    row.sizes.push(figures);
+                }
+            }
         }
+    }
+    for row in &mut rows {
+        row.sizes.sort_by_key(|s| std::cmp::Reverse(s.height_px));
     }
     if settings.client {
         add_base_colors(original.0, levels, &views, &mut rows);
@@ -185,14 +198,6 @@ fn add_appearance(
         row.jump_to_next = found.jump;
         row.orbit = found.orbit;
     }
-}
-
-fn measure(reference: &Reference, level: &Drawable, client: bool) -> SizeFigures {
-    let mut figures = reference.compare_drawable(level, Sampling::REFERENCE);
-    if client {
-        figures.client = Some(Box::new(reference.compare_client(level)));
-    }
-    figures
 }
 
 /// Sorted from large to small, each once, none under a pixel.

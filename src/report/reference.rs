@@ -60,9 +60,24 @@ impl Reference {
         views: &[View],
         heights_px: &[u32],
     ) -> Vec<Self> {
-        let mut out: Vec<Self> = Vec::new();
+        let mut out = Self::chains(drawable, original, views, heights_px)
+            .into_iter()
+            .flatten()
+            .collect::<Vec<_>>();
+        out.sort_by_key(|r| heights_px.iter().position(|&px| px == r.height_px));
+        out
+    }
+
+    /// As [`Reference::each`], grouped by what was drawn once.
+    pub fn chains(
+        drawable: &Drawable,
+        original: &Model,
+        views: &[View],
+        heights_px: &[u32],
+    ) -> Vec<Vec<Self>> {
+        let mut out: Vec<Vec<Self>> = Vec::new();
         for &height_px in heights_px {
-            if out.iter().any(|r| r.height_px == height_px) {
+            if out.iter().flatten().any(|r| r.height_px == height_px) {
                 continue;
             }
             let halvings = |&px: &u32| {
@@ -70,9 +85,8 @@ impl Reference {
                 (px << times == height_px && times <= MOST_HALVINGS).then_some(times)
             };
             let times: Vec<u32> = heights_px.iter().filter_map(halvings).collect();
-            out.extend(Self::halved(drawable, original, views, height_px, &times));
+            out.push(Self::halved(drawable, original, views, height_px, &times));
         }
-        out.sort_by_key(|r| heights_px.iter().position(|&px| px == r.height_px));
         out
     }
 
@@ -152,8 +166,8 @@ impl Reference {
         placement: Placement,
         sampling: Sampling,
     ) -> SizeFigures {
-        self.compare_pictures(|camera| {
-            coverage(scene, &camera.placed(placement), sampling).coverage()
+        self.compare_pictures(|picture| {
+            coverage(scene, &picture.camera.placed(placement), sampling).coverage()
         })
     }
 
@@ -161,13 +175,54 @@ impl Reference {
     /// samples a pixel for edges and one for materials.
     pub fn compare_client(&self, level: &Drawable) -> SizeFigures {
         let (scene, placement) = (level.scene(), level.placement_in(self.frame));
-        self.compare_pictures(|camera| coverage_multisampled(&scene, &camera.placed(placement)))
+        self.compare_pictures(|picture| {
+            coverage_multisampled(&scene, &picture.camera.placed(placement))
+        })
     }
 
-    fn compare_pictures(&self, draw: impl Fn(&Camera) -> Coverage + Sync) -> SizeFigures {
+    /// The original compared with itself.
+    pub fn compare_itself(&self) -> SizeFigures {
+        self.compare_pictures(|picture| picture.original.clone())
+    }
+
+    /// Compares a level with every size of one of [`Reference::chains`]. It is drawn once, at the
+    /// largest, as the original was: a level that equals it has no error at any size.
+    pub fn compare_chain(chain: &[Self], level: &Drawable) -> Vec<SizeFigures> {
+        let Some(top) = chain.first() else {
+            return Vec::new();
+        };
+        let (scene, placement) = (level.scene(), level.placement_in(top.frame));
+        let least: Vec<f64> = chain.iter().map(Self::least_area).collect();
+        let views: Vec<Vec<ViewFigures>> = (0..top.pictures.len())
+            .into_par_iter()
+            .map(|view| {
+                let camera = top.pictures[view].camera.placed(placement);
+                let mut mask = coverage(&scene, &camera, Sampling::REFERENCE);
+                let mut at = |(reference, least): (&Self, &f64)| {
+                    let picture = &reference.pictures[view];
+                    mask.side = Sampling::REFERENCE.side * (camera.width / picture.camera.width);
+                    [mask.width, mask.height] = [picture.camera.width, picture.camera.height];
+                    picture.figures(&mask.coverage(), *least)
+                };
+                chain.iter().zip(&least).map(&mut at).collect()
+            })
+            .collect();
+        let mut columns: Vec<_> = views.into_iter().map(Vec::into_iter).collect();
+        let of_size = |reference: &Self| {
+            reference.summary(columns.iter_mut().filter_map(Iterator::next).collect())
+        };
+        chain.iter().map(of_size).collect()
+    }
+
+    /// Pixels that both areas are topped up to in views that are edge-on.
+    fn least_area(&self) -> f64 {
         let all: f64 = self.pictures.iter().map(|p| p.original.area()).sum();
-        let least = EDGE_ON * all / self.pictures.len().max(1) as f64;
-        let figures = |picture: &Picture| picture.figures(&draw(&picture.camera), least);
+        EDGE_ON * all / self.pictures.len().max(1) as f64
+    }
+
+    fn compare_pictures(&self, draw: impl Fn(&Picture) -> Coverage + Sync) -> SizeFigures {
+        let least = self.least_area();
+        let figures = |picture: &Picture| picture.figures(&draw(picture), least);
         self.summary(self.pictures.par_iter().map(figures).collect())
     }
 

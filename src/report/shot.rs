@@ -41,7 +41,14 @@ impl Shot {
             .zip(&layers.coverage)
             .map(over)
             .collect();
-        let srgb: Vec<[f32; 3]> = light.iter().map(|c| c.map(srgb_from_linear)).collect();
+        let ground = [srgb_from_linear(GROUND); 3];
+        let srgb: Vec<[f32; 3]> = light
+            .iter()
+            .map(|&c| match c == [GROUND; 3] {
+                true => ground,
+                false => c.map(srgb_from_linear),
+            })
+            .collect();
         let grey: Vec<f32> = srgb
             .iter()
             .map(|[r, g, b]| 0.299 * r + 0.587 * g + 0.114 * b)

@@ -142,17 +142,6 @@ impl Window {
         }
     }
 
-    /// The same window where the tree is `parts` times smaller; `parts` divides the grain.
-    pub fn smaller(self, parts: u32) -> Self {
-        let n = parts as i32;
-        Self {
-            left: self.left / n,
-            top: self.top / n,
-            width: self.width / parts,
-            height: self.height / parts,
-        }
-    }
-
     /// The view's camera on this window.
     pub fn camera(self, view: &View, height: f32, height_px: u32) -> Camera {
         Camera {
