@@ -16,6 +16,7 @@ use crate::detail::wood::Wood;
 use crate::error::{Error, Result};
 use crate::export::combined::{Packed, extras, write_combined};
 use crate::export::gltf::{encode_images, write_glb};
+use crate::export::instanced::{copies_but_for_normals, write_instanced};
 use crate::export::manifest::{
     self, FORMAT, Manifest, Provenance, Range, Reference, SUFFIX, VERSION,
 };
@@ -28,7 +29,7 @@ pub use crate::ladder::{Limit, Wanted};
 use crate::level::{Baker, LevelRequest, MASK_HEIGHT};
 use crate::recipe::{Method, Recipe};
 use crate::report::band::{Fault, Trunk, faults};
-use crate::report::schema::Report;
+use crate::report::schema::{Instancing, Report};
 use crate::report::{Judged, Settings, heights, judge};
 use crate::scene::Scene;
 use crate::space::sha256::sha256;
@@ -105,11 +106,21 @@ pub fn bake(request: &Request, watch: &dyn Watch) -> Result<Baked> {
     );
     let (packed, levels) = levels(request, &tree, &rungs, &ranges, watch)?;
     begin(watch, "write", packed.len() as u64 + 1)?;
-    let files = write(&package, &tree, &packed, watch)?;
+    let mut files = write(&package, &tree, &packed, watch)?;
+    let instancing = match request.recipe.instancing {
+        true => instanced(&package, &tree, &request.recipe, &packed[0], &mut files)?,
+        false => None,
+    };
     let judged = read_back(&package, &packed[1..], &rungs)?;
     begin(watch, "measure", heights(&judged).len() as u64)?;
-    let report = measure(&tree.model, &files[0], &judged, watch)?;
+    let report = Report {
+        instancing,
+        ..measure(&tree.model, &files[0], &judged, watch)?
+    };
     let mut warnings = levels.tree.warnings.clone();
+    if request.recipe.instancing {
+        warnings.extend(alone(&tree, &request.recipe, report.instancing.as_ref()));
+    }
     warnings.extend(accept(
         in_band(&tree, &rungs, &judged, &report),
         request.accept,
@@ -275,6 +286,52 @@ fn write(
     files.extend([all, "report.json".into(), tree.model.name.clone() + SUFFIX]);
     step(watch)?;
     Ok(files)
+}
+
+/// Writes level 0 as prototypes and copies, if its leaves repeat.
+fn instanced(
+    package: &Package,
+    tree: &Tree,
+    recipe: &Recipe,
+    plain: &Packed,
+    files: &mut Vec<String>,
+) -> Result<Option<Instancing>> {
+    let Some((bytes, told)) = write_instanced(tree, recipe, plain.extras.clone())? else {
+        return Ok(None);
+    };
+    let file = format!("{}_instanced.glb", tree.model.name);
+    package.write(&file, &bytes)?;
+    let plain = package.file(&files[0]);
+    let plain_file_bytes = std::fs::metadata(&plain).map_err(|e| Error::io(&plain, "read", e))?;
+    // The manifest stays last: who finds it finds all the others.
+    files.insert(files.len() - 1, file.clone());
+    Ok(Some(Instancing {
+        file,
+        plain_file_bytes: plain_file_bytes.len(),
+        ..told
+    }))
+}
+
+/// What keeps leaves from being copies, where it is most of them.
+fn alone(tree: &Tree, recipe: &Recipe, instancing: Option<&Instancing>) -> Option<String> {
+    let (leaves, copies) = (
+        tree.leaves.len(),
+        instancing.map_or(0, |i| i.copies as usize),
+    );
+    if 2 * copies >= leaves {
+        return None;
+    }
+    let shapes = copies_but_for_normals(tree, recipe);
+    let help = match shapes > 2 * copies {
+        true => format!(
+            "; {shapes} have the shape but not the normals of another \
+             (recipe: instance_normals_deg: 180 shares them)"
+        ),
+        false => String::new(),
+    };
+    Some(format!(
+        "only {copies} of {leaves} leaves are exact copies of others{help}"
+    ))
 }
 
 /// Loads the levels as an engine would: from their files.

@@ -102,6 +102,17 @@ pub struct Recipe {
     pub validity_px: f64,
     /// Share of a group's visible area that the adaptive loop may lose, 0 to 1.
     pub tolerance: f64,
+    /// Whether level 0 is also written as prototypes of leaves and their places, in a file of its
+    /// own.
+    pub instancing: bool,
+    /// Largest distance of a copy's corner from the original's, over the leaf's radius, 0 to 0.1; no
+    /// less is asked than what rounding to f32 does.
+    pub instance_tolerance: f64,
+    /// Largest angle between a copy's normal and the original's, degrees, 0 to 180: leaves of one
+    /// shape whose normals lean out of the crown need more than the default of 1.
+    pub instance_normals_deg: f64,
+    /// Up to so many copies are plain nodes, more are EXT_mesh_gpu_instancing, 0 to 1,000,000.
+    pub instance_nodes: u32,
     /// Memory that the trees of a batch may take together, MiB, 0 to 1,048,576; 0: half of the
     /// machine's. Changes no package.
     pub memory_mib: u32,
@@ -132,6 +143,19 @@ impl Knobs for Recipe {
             range("refine_rounds", self.refine_rounds.into(), 0.0, 100.0),
             range("validity_px", self.validity_px, 0.1, 64.0),
             range("tolerance", self.tolerance, 0.0, 1.0),
+            range("instance_tolerance", self.instance_tolerance, 0.0, 0.1),
+            range(
+                "instance_normals_deg",
+                self.instance_normals_deg,
+                0.0,
+                180.0,
+            ),
+            range(
+                "instance_nodes",
+                self.instance_nodes.into(),
+                0.0,
+                1_000_000.0,
+            ),
             range("memory_mib", self.memory_mib.into(), 0.0, 1_048_576.0),
             range("training_views", self.training_views.into(), 4.0, 64.0),
         ]
@@ -197,6 +221,10 @@ impl Recipe {
             billboards: vec![Billboard::Cross, Billboard::Strip],
             validity_px: 3.0,
             tolerance: 0.2,
+            instancing: false,
+            instance_tolerance: 1e-5,
+            instance_normals_deg: 1.0,
+            instance_nodes: 500,
             memory_mib: 0,
         }
     }

@@ -8,6 +8,7 @@ pub mod model;
 pub mod organ;
 pub mod part;
 pub mod portrait;
+pub mod prototype;
 pub mod recognise;
 pub mod skeleton;
 pub mod subtree;

@@ -66,6 +66,8 @@ pub struct Object {
     pub name: String,
     /// Index of the mesh in the file.
     pub mesh: u32,
+    /// Which of its node's instances (EXT_mesh_gpu_instancing) it is; 0 where the node has none.
+    pub instance: u32,
     /// Index of the primitive in the mesh.
     pub primitive: u32,
     /// Index into [`Model::materials`].

@@ -50,6 +50,9 @@ pub struct Args {
     /// Screen, field of view and distances (RON).
     #[arg(long, value_name = "FILE.ron")]
     scene: Option<PathBuf>,
+    /// Write level 0 also as prototypes of leaves and their places (NAME_instanced.glb).
+    #[arg(long)]
+    instancing: bool,
     /// Keep levels that left their band instead of refusing the bake.
     #[arg(long)]
     accept: bool,
@@ -121,9 +124,15 @@ fn request(args: &Args) -> Result<Request> {
             false => Wanted::Limits(args.triangles.clone()),
         },
         max_error_px: args.max_error,
-        recipe: match &args.recipe {
-            Some(file) => read(file, &preset)?,
-            None => preset,
+        recipe: {
+            let recipe = match &args.recipe {
+                Some(file) => read(file, &preset)?,
+                None => preset,
+            };
+            Recipe {
+                instancing: recipe.instancing || args.instancing,
+                ..recipe
+            }
         },
         scene: match &args.scene {
             Some(file) => read(file, &Scene::default())?,
@@ -184,6 +193,17 @@ fn table(baked: &Baked, took: &Bake, request: &Request) -> String {
     }
     for level in &baked.report.levels {
         out += &line(level);
+    }
+    if let Some(instanced) = &baked.report.instancing {
+        out += &format!(
+            "\n{}: {} of {} leaves are copies of {}; {:.1} MB, written out {:.1} MB\n",
+            instanced.file,
+            instanced.copies,
+            instanced.leaves,
+            instanced.prototypes,
+            mib(instanced.file_bytes),
+            mib(instanced.plain_file_bytes),
+        );
     }
     out += &format!(
         "\n{} files in {} after {:.1} s",

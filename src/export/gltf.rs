@@ -3,6 +3,7 @@
 //! Single files carry no required extension, because that is the only form that every client
 //! shows right. The root node holds the similarity from normalised space back to the world.
 
+use glam::Vec3;
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 
@@ -47,38 +48,54 @@ pub struct FileBuilder {
     samplers: Vec<Value>,
     unlit: bool,
     used: Vec<&'static str>,
+    required: Vec<&'static str>,
 }
 
 impl FileBuilder {
     /// Adds all surfaces of a scene as one mesh and returns its index; `pngs` are its images.
     /// Images and materials that an earlier mesh has brought are shared.
     pub fn mesh(&mut self, name: &str, scene: &Scene, pngs: &[Vec<u8>]) -> Result<usize> {
+        let materials = self.materials(scene, pngs);
+        self.mesh_of(name, &scene.surfaces, &scene.materials, &materials)
+    }
+
+    /// Adds a scene's materials and images; returns the number of each material in the file.
+    pub fn materials(&mut self, scene: &Scene, pngs: &[Vec<u8>]) -> Vec<usize> {
         let images: Vec<usize> = scene
             .images
             .iter()
             .zip(pngs)
             .map(|(image, png)| self.image(&image.name, png))
             .collect();
-        let materials: Vec<usize> = scene
+        scene
             .materials
             .iter()
             .map(|material| {
                 let value = self.material(material, &images);
                 find_or_push(&mut self.materials, value)
             })
-            .collect();
+            .collect()
+    }
+
+    /// Adds surfaces as one mesh and returns its index; `numbers` are those of their materials in
+    /// the file ([`FileBuilder::materials`]).
+    pub fn mesh_of(
+        &mut self,
+        name: &str,
+        surfaces: &[Surface],
+        materials: &[Material],
+        numbers: &[usize],
+    ) -> Result<usize> {
         let mut primitives = Vec::new();
-        for surface in scene.surfaces.iter().filter(|s| !s.triangles.is_empty()) {
-            let uses = uv_sets(&scene.materials[surface.material as usize]);
+        for surface in surfaces.iter().filter(|s| !s.triangles.is_empty()) {
+            let uses = uv_sets(&materials[surface.material as usize]);
             let mut attributes = Map::new();
             attributes.insert(
                 "POSITION".into(),
                 json!(self.glb.positions(&surface.positions)),
             );
             attributes.insert("NORMAL".into(), json!(self.glb.vec3(&surface.normals)));
-            if let Some(tangents) =
-                tangents_of(surface, &scene.materials[surface.material as usize])
-            {
+            if let Some(tangents) = tangents_of(surface, &materials[surface.material as usize]) {
                 attributes.insert("TANGENT".into(), json!(self.glb.vec4(&tangents)));
             }
             if uses[0] || uses[1] {
@@ -96,7 +113,7 @@ impl FileBuilder {
             primitives.push(json!({
                 "attributes": attributes,
                 "indices": indices,
-                "material": materials[surface.material as usize],
+                "material": numbers[surface.material as usize],
             }));
         }
         if primitives.is_empty() {
@@ -127,9 +144,21 @@ impl FileBuilder {
 
     /// Adds a node that places a mesh in the world and returns its index.
     pub fn node(&mut self, name: &str, mesh: usize, frame: &Frame, extras: Value) -> usize {
+        let node = json!({ "name": name, "mesh": mesh });
+        self.placed(node, frame, extras)
+    }
+
+    /// Adds a node that is not placed: its children are in normalised space where their parent is
+    /// [`FileBuilder::placed`].
+    pub fn child(&mut self, node: Value) -> usize {
+        self.nodes.push(node);
+        self.nodes.len() - 1
+    }
+
+    /// Places a node in the world, adds it and returns its index.
+    pub fn placed(&mut self, mut node: Value, frame: &Frame, extras: Value) -> usize {
         let c = frame.center.to_array().map(|v| v as f32);
         let r = frame.radius as f32;
-        let mut node = json!({ "name": name, "mesh": mesh });
         if c != [0.0; 3] {
             node["translation"] = json!(c);
         }
@@ -139,8 +168,16 @@ impl FileBuilder {
         if !extras.is_null() {
             node["extras"] = extras;
         }
-        self.nodes.push(node);
-        self.nodes.len() - 1
+        self.child(node)
+    }
+
+    /// What EXT_mesh_gpu_instancing says of a node: translations, rotations (x, y, z, w), scales.
+    pub fn instances(&mut self, moved: &[Vec3], turned: &[[f32; 4]], scaled: &[Vec3]) -> Value {
+        json!({ "EXT_mesh_gpu_instancing": { "attributes": {
+            "TRANSLATION": self.glb.vec3(moved),
+            "ROTATION": self.glb.vec4(turned),
+            "SCALE": self.glb.vec3(scaled),
+        } } })
     }
 
     /// The JSON of a node, for extensions.
@@ -153,6 +190,12 @@ impl FileBuilder {
         if !self.used.contains(&name) {
             self.used.push(name);
         }
+    }
+
+    /// Names an extension without which the file shows something else.
+    pub fn require_extension(&mut self, name: &'static str) {
+        self.use_extension(name);
+        self.required.push(name);
     }
 
     /// The file with a scene of the given nodes.
@@ -180,6 +223,9 @@ impl FileBuilder {
         }
         if !self.used.is_empty() {
             root["extensionsUsed"] = json!(self.used);
+        }
+        if !self.required.is_empty() {
+            root["extensionsRequired"] = json!(self.required);
         }
         self.glb.finish(root)
     }

@@ -6,6 +6,7 @@ pub mod combined;
 pub mod edge;
 pub mod foliage;
 pub mod gltf;
+pub mod instanced;
 pub mod manifest;
 mod manifest_check;
 pub mod matching;

@@ -2,6 +2,7 @@
 //! triangles or from simplified wood.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use glam::{Vec2, Vec3};
 
@@ -59,24 +60,26 @@ impl Scene {
 
 /// The chosen triangles of a model as surfaces, one for each material, with only the images used.
 pub fn scene_of_model(model: &Model, triangles: impl Iterator<Item = u32>) -> Scene {
-    let material = |t: u32| model.objects[model.triangle_object[t as usize] as usize].material;
     let mut assembly = Assembly::new(model, model.positions.len());
-    for (material, triangles) in by_material(triangles.map(|t| (material(t), t))) {
-        let copy = assembly.material(material);
-        let name = copy.name.clone();
-        let corners = triangles.iter().map(|&t| model.triangles[t as usize]);
-        assembly.surface(name, copy, corners, |surface, at| {
-            surface.positions.push(model.positions[at]);
-            surface.normals.push(model.normals[at]);
-            for set in 0..2 {
-                surface.uvs[set].extend(model.uvs[set].get(at));
-            }
-            surface.colors.extend(model.colors.get(at));
-        });
-    }
+    assembly.triangles(triangles);
     assembly.finish()
 }
 
+/// As [`scene_of_model`], for several groups of triangles: which surfaces each has become.
+pub fn scene_of_groups<'t>(
+    model: &Model,
+    groups: impl Iterator<Item = &'t [u32]>,
+) -> (Scene, Vec<Range<usize>>) {
+    let mut assembly = Assembly::new(model, model.positions.len());
+    let surfaces = groups
+        .map(|group| {
+            let before = assembly.scene.surfaces.len();
+            assembly.triangles(group.iter().copied());
+            before..assembly.scene.surfaces.len()
+        })
+        .collect();
+    (assembly.finish(), surfaces)
+}
 /// Simplified wood as surfaces, one for each material of the model that it uses.
 pub fn scene_of_wood(model: &Model, mesh: &WoodMesh) -> Scene {
     let mut assembly = Assembly::new(model, mesh.positions.len());
@@ -153,6 +156,25 @@ impl<'a> Assembly<'a> {
             texture.image = number;
         }
         copy
+    }
+
+    /// Adds a surface for each material of some of the model's triangles.
+    fn triangles(&mut self, triangles: impl Iterator<Item = u32>) {
+        let model = self.model;
+        let material = |t: u32| model.objects[model.triangle_object[t as usize] as usize].material;
+        for (material, triangles) in by_material(triangles.map(|t| (material(t), t))) {
+            let copy = self.material(material);
+            let name = copy.name.clone();
+            let corners = triangles.iter().map(|&t| model.triangles[t as usize]);
+            self.surface(name, copy, corners, |surface, at| {
+                surface.positions.push(model.positions[at]);
+                surface.normals.push(model.normals[at]);
+                for set in 0..2 {
+                    surface.uvs[set].extend(model.uvs[set].get(at));
+                }
+                surface.colors.extend(model.colors.get(at));
+            });
+        }
     }
 
     /// Adds a surface; `push` appends one vertex of the source to it.

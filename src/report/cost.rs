@@ -5,10 +5,12 @@ use std::collections::BTreeSet;
 use crate::botany::Model;
 use crate::botany::model::TextureRef;
 
-/// Draw calls of an engine that does not batch: one for each primitive of each placed mesh.
+/// Draw calls of an engine that does not batch: one for each primitive of each placed mesh, however
+/// many instances its node has.
 pub fn draw_calls(model: &Model) -> u64 {
     let drawn: BTreeSet<u32> = model.triangle_object.iter().copied().collect();
-    drawn.len() as u64
+    let first = |&&object: &&u32| model.objects[object as usize].instance == 0;
+    drawn.iter().filter(first).count() as u64
 }
 
 /// Bytes on the GPU of all textures in use, uncompressed RGBA with all mips.
@@ -77,18 +79,23 @@ mod tests {
             base_color,
             ..Material::default()
         };
-        let object = |material| Object {
+        let object = |material, instance| Object {
             material,
+            instance,
             ..Object::default()
         };
         let model = Model {
-            triangle_object: vec![0, 0, 2],
-            objects: vec![object(0), object(1), object(1)],
+            triangle_object: vec![0, 0, 2, 3],
+            objects: vec![object(0, 0), object(1, 0), object(1, 0), object(1, 1)],
             materials: vec![material.clone(), material],
             images: vec![image.clone(), image],
             ..Model::default()
         };
         assert_eq!(texture_bytes(&model), 20);
-        assert_eq!(draw_calls(&model), 2, "object 1 has no triangles");
+        assert_eq!(
+            draw_calls(&model),
+            2,
+            "object 1 has no triangles, 3 is a copy"
+        );
     }
 }

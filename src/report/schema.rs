@@ -15,6 +15,9 @@ pub struct Report {
     /// What the sharing of self-similar sub-trees saves and costs; absent where nothing was baked.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub sharing: Option<Sharing>,
+    /// Level 0 as prototypes and copies; absent where that was not asked for or no leaf repeats.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub instancing: Option<Instancing>,
     /// What the bake itself took: in the output of `bake --json` alone. It is absent from
     /// `report.json`, because a package is the same byte for byte on every run.
     #[serde(skip_serializing_if = "Option::is_none", default)]
@@ -222,6 +225,29 @@ pub struct Sharing {
     pub f1_with: f64,
     /// Mean F1 without.
     pub f1_without: f64,
+}
+
+/// Level 0 as prototypes of leaves and their places.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Instancing {
+    /// The file, without its folder.
+    pub file: String,
+    /// Leaves of the tree.
+    pub leaves: u64,
+    /// Leaves that others are copies of.
+    pub prototypes: u64,
+    /// Placed copies, prototypes included.
+    pub copies: u64,
+    /// Triangles that no copy stands for: wood, and leaves that are like no other.
+    pub plain_triangles: u64,
+    /// Whether copies are instances by EXT_mesh_gpu_instancing, not nodes.
+    pub extension: bool,
+    /// Largest distance of a corner from where the original has it, over its leaf's radius.
+    pub largest_deviation: f64,
+    /// Bytes of the file.
+    pub file_bytes: u64,
+    /// Bytes of level 0 with every leaf written out.
+    pub plain_file_bytes: u64,
 }
 
 /// What a bake took.

@@ -169,6 +169,7 @@ fn append(model: &mut Model, placement: &Placement, part: &Part, totals: &Totals
     model.objects.push(Object {
         name: placement.name.to_string(),
         mesh: placement.mesh as u32,
+        instance: placement.instance,
         primitive: part.primitive as u32,
         material: part.material,
     });

@@ -15,6 +15,8 @@ use crate::Result;
 pub(super) struct Placement {
     pub name: Rc<str>,
     pub mesh: usize,
+    /// Which of its node's instances it is.
+    pub instance: u32,
     pub world_from_mesh: DMat4,
 }
 
@@ -153,9 +155,11 @@ fn place_mesh(
         let what = format!("more than {most} placed primitives");
         return Err(asset.fault(place, what, "join objects before the export"));
     }
-    out.extend(instances.into_iter().map(|node_from_instance| Placement {
+    let numbered = (0u32..).zip(instances);
+    out.extend(numbered.map(|(instance, node_from_instance)| Placement {
         name: name.clone(),
         mesh,
+        instance,
         world_from_mesh: world_from_node * node_from_instance,
     }));
     Ok(())
