@@ -104,6 +104,20 @@ pub fn rungs(wanted: &Wanted, scene: &Scene, all: u64, least: u64) -> Result<Vec
     Ok(limits.iter().enumerate().map(rung).collect())
 }
 
+/// The rungs that are seen in the scene, of a tree `height_m` high. What is left out costs nothing.
+pub fn seen(rungs: Vec<Rung>, scene: &Scene, height_m: f64) -> Vec<Rung> {
+    let last = rungs.len().saturating_sub(1);
+    let shown = |(i, rung): (usize, Rung)| {
+        let end_px = match i == last {
+            true => scene.vanish_height_px,
+            false => rung.end_px,
+        };
+        let [start, end] = [rung.height_px, end_px].map(|px| scene.distance(height_m, px));
+        scene.shows(start, end).then_some(rung)
+    };
+    rungs.into_iter().enumerate().filter_map(shown).collect()
+}
+
 fn explicit(limits: &[Limit], all: u64, least: u64) -> Result<Vec<u64>> {
     let counts: Vec<u64> = limits.iter().map(|l| l.triangles(all)).collect();
     if let Some(i) = counts.iter().position(|&n| n < least) {
@@ -245,6 +259,26 @@ mod tests {
             super::rungs(&Wanted::Levels(1), &scene, 1000, LEAST_TRIANGLES).unwrap()[0].height_px,
             100.0
         );
+    }
+
+    #[test]
+    fn levels_that_no_camera_sees_are_left_out() {
+        // A tree of 10 m: 18.3 m at 512 pixels, 36.5 m at 256, 73.1 m at 128, 146.2 m at 64.
+        let all = of(Wanted::default(), 100_000);
+        let heights = |nearest_m, farthest_m| -> Vec<f64> {
+            let scene = Scene {
+                nearest_m,
+                farthest_m,
+                ..Scene::default()
+            };
+            let kept = seen(all.clone(), &scene, 10.0);
+            kept.iter().map(|r| r.height_px).collect()
+        };
+        assert_eq!(heights(0.0, 0.0), [512.0, 256.0, 128.0, 64.0]);
+        assert_eq!(heights(50.0, 0.0), [256.0, 128.0, 64.0]);
+        assert_eq!(heights(1000.0, 0.0), [64.0]);
+        assert_eq!(heights(20.0, 73.0), [512.0, 256.0]);
+        assert!(heights(0.0, 10.0).is_empty());
     }
 
     #[test]

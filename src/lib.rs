@@ -36,6 +36,8 @@ pub mod level;
 #[cfg(feature = "bake")]
 pub mod pipeline;
 #[cfg(feature = "bake")]
+pub mod plan;
+#[cfg(feature = "bake")]
 pub mod recipe;
 #[cfg(feature = "bake")]
 pub mod report;

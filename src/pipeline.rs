@@ -24,7 +24,7 @@ use crate::export::original::Original;
 use crate::export::package::Package;
 use crate::export::surface::{self, scene_of_model};
 use crate::knobs::check;
-use crate::ladder::{LEAST_TRIANGLES, Rung, WHOLE_TREE_TRIANGLES, ranges, rungs};
+use crate::ladder::{LEAST_TRIANGLES, Rung, WHOLE_TREE_TRIANGLES, ranges, rungs, seen};
 pub use crate::ladder::{Limit, Wanted};
 use crate::level::{Baker, LevelRequest, MASK_HEIGHT};
 use crate::recipe::{Method, Recipe};
@@ -95,6 +95,7 @@ pub fn bake(request: &Request, watch: &dyn Watch) -> Result<Baked> {
             _ => LEAST_TRIANGLES,
         },
     )?;
+    let rungs = seen(rungs, &request.scene, height_m(&model));
     begin(watch, "recognise", 1)?;
     let organs = request.recipe.organs.clone();
     let tree = recognise(model, &RecogniseOptions { organs })?;

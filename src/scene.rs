@@ -4,6 +4,21 @@ use serde::{Deserialize, Serialize};
 
 use crate::knobs::{Knobs, Range};
 
+/// Scenes to start from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum ScenePreset {
+    /// A tree that the camera walks up to, on a large screen: 2160 lines, levels from 1024 pixels.
+    Hero,
+    /// Trees of a game: 1080 lines, levels from 512 pixels.
+    #[default]
+    Game,
+    /// Trees in the middle distance and behind: never nearer than 40 m.
+    Landscape,
+    /// Seen from high above, as on a map: never nearer than 300 m, 30 degrees of view; nothing is
+    /// drawn under 4 pixels.
+    Map,
+}
+
 /// The screen that distances are stated for. Read from RON; keys that are left out keep the default.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -22,6 +37,12 @@ pub struct Scene {
     pub heights_px: Vec<f64>,
     /// Height in pixels under which nothing is drawn, 0 to 64; default 0: never.
     pub vanish_height_px: f64,
+    /// Nearest that a camera comes to the middle of a tree, metres; default 0. Levels that end
+    /// before are not baked.
+    pub nearest_m: f64,
+    /// Farthest that a tree is drawn, metres; default 0: no end. Levels that start behind are not
+    /// baked.
+    pub farthest_m: f64,
     /// Levels fade into each other between their distance and this many times that, 1 to 2;
     /// default 1.1.
     pub fade: f64,
@@ -36,6 +57,8 @@ impl Default for Scene {
             first_height_px: 512.0,
             heights_px: Vec::new(),
             vanish_height_px: 0.0,
+            nearest_m: 0.0,
+            farthest_m: 0.0,
             fade: 1.1,
         }
     }
@@ -63,6 +86,17 @@ impl Knobs for Scene {
             range("first_height_px", self.first_height_px, 8.0, 16384.0),
             range("vanish_height_px", self.vanish_height_px, 0.0, 64.0),
             range("fade", self.fade, 1.0, 2.0),
+            range("nearest_m", self.nearest_m, 0.0, 1e9),
+            range(
+                "farthest_m",
+                self.farthest_m,
+                if self.farthest_m == 0.0 {
+                    0.0
+                } else {
+                    self.nearest_m
+                },
+                1e12,
+            ),
         ];
         let mut nearer = 16384.0;
         for &height in &self.heights_px {
@@ -74,6 +108,34 @@ impl Knobs for Scene {
 }
 
 impl Scene {
+    /// The scene of a preset.
+    pub fn preset(preset: ScenePreset) -> Self {
+        let game = Self::default();
+        match preset {
+            ScenePreset::Game => game,
+            ScenePreset::Hero => Self {
+                screen_height_px: 2160,
+                first_height_px: 1024.0,
+                ..game
+            },
+            ScenePreset::Landscape => Self {
+                nearest_m: 40.0,
+                ..game
+            },
+            ScenePreset::Map => Self {
+                nearest_m: 300.0,
+                fov_deg: 30.0,
+                vanish_height_px: 4.0,
+                ..game
+            },
+        }
+    }
+
+    /// Whether anything of what is shown from `distance_m` to `end_m` is ever seen, metres.
+    pub fn shows(&self, distance_m: f64, end_m: f64) -> bool {
+        end_m > self.nearest_m && (self.farthest_m == 0.0 || distance_m < self.farthest_m)
+    }
+
     /// Distance at which something `height` units high is `height_px` pixels high, in its unit:
     /// `d = H / (2 s tan(fov / 2))` with the share `s` of the screen's height.
     pub fn distance(&self, height: f64, height_px: f64) -> f64 {

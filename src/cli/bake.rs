@@ -6,13 +6,13 @@ use std::time::Instant;
 
 use super::batch;
 use super::progress::{Bars, catch_ctrl_c};
+use super::scene::scene;
 use crate::batch::Batch;
 use crate::error::{Error, Result};
 use crate::knobs::read;
 use crate::pipeline::{Baked, Limit, Request, Wanted, bake, to_json};
 use crate::recipe::{Preset, Recipe};
 use crate::report::schema::{Bake, Level, Report};
-use crate::scene::Scene;
 use crate::threads::pool;
 use crate::watch::Clock;
 
@@ -47,8 +47,8 @@ pub struct Args {
     /// Knobs that differ from the preset (RON).
     #[arg(long, value_name = "FILE.ron")]
     recipe: Option<PathBuf>,
-    /// Screen, field of view and distances (RON).
-    #[arg(long, value_name = "FILE.ron")]
+    /// Screen, field of view and distances: hero, game, landscape, map, or a file (RON).
+    #[arg(long, value_name = "NAME|FILE.ron")]
     scene: Option<PathBuf>,
     /// Write level 0 also as prototypes of leaves and their places (NAME_instanced.glb).
     #[arg(long)]
@@ -134,10 +134,7 @@ fn request(args: &Args) -> Result<Request> {
                 ..recipe
             }
         },
-        scene: match &args.scene {
-            Some(file) => read(file, &Scene::default())?,
-            None => Scene::default(),
-        },
+        scene: scene(args.scene.as_deref())?,
         force: args.force,
         accept: args.accept,
     })

@@ -5,7 +5,9 @@ mod batch;
 mod evaluate;
 mod grow;
 mod inspect;
+mod plan;
 mod progress;
+mod scene;
 mod study;
 mod sweep;
 
@@ -27,6 +29,7 @@ enum Command {
     Evaluate(evaluate::Args),
     Grow(grow::GrowArgs),
     Inspect(inspect::InspectArgs),
+    Plan(plan::Args),
     Sweep(sweep::Args),
     Study(study::StudyArgs),
 }
@@ -45,6 +48,7 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         Command::Evaluate(args) => evaluate::run(&args),
         Command::Grow(args) => grow::run(&args),
         Command::Inspect(args) => inspect::run(&args),
+        Command::Plan(args) => plan::run(&args),
         Command::Sweep(args) => sweep::run(&args),
         Command::Study(args) => study::run(&args),
     };

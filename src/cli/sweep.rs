@@ -4,10 +4,9 @@ use std::path::{Path, PathBuf};
 
 use super::bake::{limit, print};
 use super::progress::{Bars, catch_ctrl_c};
+use super::scene::scene;
 use crate::error::{Error, Result};
-use crate::knobs::read;
 use crate::pipeline::{Limit, Wanted};
-use crate::scene::Scene;
 use crate::sweep::{Asked, Sweep, plot, sweep};
 use crate::threads::pool;
 
@@ -22,8 +21,8 @@ pub struct Args {
     /// One level for each: a count ("5000") or a share of the original ("10%"), wood included.
     #[arg(long, value_delimiter = ',', value_name = "N|%", value_parser = limit, default_value = "10%,3%,1%,24")]
     triangles: Vec<Limit>,
-    /// Screen, field of view and distances (RON).
-    #[arg(long, value_name = "FILE.ron")]
+    /// Screen, field of view and distances: hero, game, landscape, map, or a file (RON).
+    #[arg(long, value_name = "NAME|FILE.ron")]
     scene: Option<PathBuf>,
     /// Only these variants beside the balanced preset, for example "draft,best,samples 2".
     #[arg(long, value_delimiter = ',', value_name = "NAMES")]
@@ -44,10 +43,7 @@ pub fn run(args: &Args) -> Result<()> {
     let asked = Asked {
         input: args.input.clone(),
         wanted: Wanted::Limits(args.triangles.clone()),
-        scene: match &args.scene {
-            Some(file) => read(file, &Scene::default())?,
-            None => Scene::default(),
-        },
+        scene: scene(args.scene.as_deref())?,
         only: args.only.clone(),
     };
     catch_ctrl_c()?;

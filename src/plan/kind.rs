@@ -1,0 +1,115 @@
+//! One kind of tree: what the plan has to know of its file, and where its trees stand.
+
+use std::path::{Path, PathBuf};
+
+use glam::DVec3;
+
+use super::places::{self, Spot};
+use super::spec::{Spec, Species};
+use crate::botany::load::load;
+use crate::error::{Error, Result};
+use crate::ladder::{LEAST_TRIANGLES, Wanted, rungs};
+use crate::report::texture_bytes;
+use crate::scene::Scene;
+
+/// A kind of tree.
+#[derive(Clone, Debug)]
+pub struct Kind {
+    /// The file's stem.
+    pub name: String,
+    /// The file.
+    pub input: PathBuf,
+    /// Triangles of the original.
+    pub triangles: u64,
+    /// Bytes of the original's textures on the GPU, RGBA8 with mips.
+    pub texture_bytes: u64,
+    /// Height, metres.
+    pub height_m: f64,
+    /// Middle of the bounding sphere in the file's space, and its radius, metres.
+    pub center: DVec3,
+    /// Metres.
+    pub radius_m: f64,
+    /// Where its trees stand.
+    pub spots: Vec<Spot>,
+}
+
+/// Where a level starts, and what it costs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Step {
+    /// Metres at scale 1.
+    pub distance_m: f64,
+    /// Pixels; infinite for the original.
+    pub height_px: f64,
+    /// Most triangles.
+    pub triangles: u64,
+}
+
+impl Kind {
+    /// Reads the tree and its places.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] where neither places nor a count is given, or both are; those of reading.
+    pub fn read(spec: &Spec, index: usize, species: &Species, folder: &Path) -> Result<Self> {
+        let input = folder.join(&species.input);
+        let spots = match (&species.places, species.count) {
+            (Some(file), 0) => places::read(&folder.join(file))?,
+            (None, count @ 1..) => places::strewn(count, spec.region_m, index),
+            (None, 0) => {
+                return Err(Error::usage(
+                    format!("the plan says of no {} where it stands", input.display()),
+                    "give count: 100, or places: \"file.csv\"",
+                ));
+            }
+            (Some(_), _) => {
+                return Err(Error::usage(
+                    format!("the plan gives {} both count and places", input.display()),
+                    "leave one of them out",
+                ));
+            }
+        };
+        let model = load(&input)?;
+        Ok(Self {
+            name: model.name.clone(),
+            triangles: model.triangles.len() as u64,
+            texture_bytes: texture_bytes(&model),
+            height_m: f64::from(model.height()) * model.frame.radius,
+            center: model.frame.center,
+            radius_m: model.frame.radius,
+            spots,
+            input,
+        })
+    }
+
+    /// Its levels, the original first, with all but that moved `nearer` times.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] where the scene lists fewer heights than levels.
+    pub fn ladder(&self, spec: &Spec, nearer: f64) -> Result<Vec<Step>> {
+        let wanted = Wanted::Levels(spec.levels.into());
+        let rungs = rungs(&wanted, &spec.scene, self.triangles, LEAST_TRIANGLES)?;
+        let mut out = vec![Step {
+            distance_m: 0.0,
+            height_px: f64::INFINITY,
+            triangles: self.triangles,
+        }];
+        out.extend(rungs.iter().map(|rung| {
+            // What a scene file may say at most.
+            let height_px = (rung.height_px * nearer).min(16384.0);
+            Step {
+                distance_m: spec.scene.distance(self.height_m, height_px),
+                height_px,
+                triangles: rung.triangles.min(self.triangles),
+            }
+        }));
+        Ok(out)
+    }
+
+    /// Distance at which a tree of scale 1 is no longer drawn, metres.
+    pub fn end_m(&self, scene: &Scene) -> f64 {
+        let vanished = scene.distance(self.height_m, scene.vanish_height_px);
+        match scene.farthest_m {
+            0.0 => vanished,
+            far => far.min(vanished),
+        }
+    }
+}

@@ -1,0 +1,121 @@
+//! Where the trees of a plan stand.
+
+use std::path::Path;
+
+use glam::Vec3;
+
+use crate::error::{Error, Result};
+
+/// A tree's foot and its scale.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spot {
+    /// Metres.
+    pub foot: Vec3,
+    /// Uniform.
+    pub scale: f32,
+}
+
+/// Reads a file of places.
+///
+/// # Errors
+/// [`Error::Io`]; [`Error::Input`] with the line.
+pub fn read(file: &Path) -> Result<Vec<Spot>> {
+    let text = std::fs::read_to_string(file).map_err(|e| Error::io(file, "read", e))?;
+    parse(&text, file)
+}
+
+fn parse(text: &str, file: &Path) -> Result<Vec<Spot>> {
+    let mut out = Vec::new();
+    for (number, line) in text.lines().enumerate() {
+        let line = line.trim();
+        let head = number == 0 && line.starts_with(|c: char| c.is_ascii_alphabetic());
+        if line.is_empty() || line.starts_with('#') || head {
+            continue;
+        }
+        let fault = |what: String| {
+            Error::input(
+                file,
+                format!("line {}", number + 1),
+                what,
+                "write \"x, y, z\" or \"x, y, z, scale\" in metres",
+            )
+        };
+        let number = |field: &str| match field.trim().parse::<f32>() {
+            Ok(value) if value.is_finite() => Ok(value),
+            _ => Err(fault(format!("{:?} is not a number", field.trim()))),
+        };
+        let fields: Vec<f32> = line.split([',', ';']).map(number).collect::<Result<_>>()?;
+        let (foot, scale) = match fields[..] {
+            [x, y, z] => (Vec3::new(x, y, z), 1.0),
+            [x, y, z, scale] if scale > 0.0 => (Vec3::new(x, y, z), scale),
+            [_, _, _, scale] => return Err(fault(format!("a tree can't have the scale {scale}"))),
+            _ => return Err(fault(format!("{} numbers", fields.len()))),
+        };
+        out.push(Spot { foot, scale });
+    }
+    match out.is_empty() {
+        true => Err(Error::input(
+            file,
+            "the file",
+            "there is no place in it",
+            "write a line for each tree",
+        )),
+        false => Ok(out),
+    }
+}
+
+/// So many trees, evenly strewn over a square around the origin; another `species` gets other
+/// places. The R2 sequence (Roberts 2018): each next point falls where there is most room.
+pub fn strewn(count: u32, region_m: f64, species: usize) -> Vec<Spot> {
+    // One over the plastic number, and one over its square.
+    const STEPS: [f64; 2] = [0.754_877_666_246_693, 0.569_840_290_998_053];
+    let along = |i: u32, axis: usize| {
+        let start = 0.5 + species as f64 * 0.618_033_988_749_895;
+        ((start + STEPS[axis] * f64::from(i + 1)).fract() - 0.5) * region_m
+    };
+    (0..count)
+        .map(|i| Spot {
+            foot: Vec3::new(along(i, 0) as f32, 0.0, along(i, 1) as f32),
+            scale: 1.0,
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn places_are_read_and_faults_named_by_line() {
+        let file = Path::new("birch.csv");
+        let text = "x,y,z,scale\n1, 2, 3\n\n# west\n-4;0;5.5;0.5\n";
+        let spots = parse(text, file).unwrap();
+        assert_eq!(spots.len(), 2);
+        assert_eq!(spots[1].foot, Vec3::new(-4.0, 0.0, 5.5));
+        assert_eq!((spots[0].scale, spots[1].scale), (1.0, 0.5));
+        for (text, place) in [
+            ("1,2,3\n1,2", "line 2"),
+            ("1,2,3\n1,2,inf", "line 2"),
+            ("1,2,3,-1", "line 1"),
+            ("1,2,3\nx,y,z", "line 2"),
+            ("# nothing", "no place"),
+        ] {
+            let error = parse(text, file).unwrap_err();
+            assert_eq!(error.exit_code(), 2);
+            assert!(error.to_string().contains(place), "{error}");
+        }
+    }
+
+    #[test]
+    fn strewn_trees_fill_their_region_evenly() {
+        let spots = strewn(1600, 100.0, 2);
+        let mut cells = [0u32; 16];
+        for spot in &spots {
+            assert!(spot.foot.x.abs() <= 50.0 && spot.foot.z.abs() <= 50.0);
+            let cell = |v: f32| ((v + 50.0) / 25.0).clamp(0.0, 3.0) as usize;
+            cells[cell(spot.foot.x) * 4 + cell(spot.foot.z)] += 1;
+        }
+        assert!(cells.iter().all(|&n| (90..=110).contains(&n)), "{cells:?}");
+        assert_ne!(strewn(1, 100.0, 0), strewn(1, 100.0, 1));
+    }
+}

@@ -1,0 +1,102 @@
+//! `plan.ron`: what stands in a scene, and how the camera goes through it.
+
+use std::path::PathBuf;
+
+use serde::{Deserialize, Serialize};
+
+use crate::knobs::{Knobs, Range};
+use crate::scene::Scene;
+
+/// What is planned. Read from RON; keys that are left out keep the default. Paths are relative to
+/// the file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Spec {
+    /// Screen and field of view; its `nearest_m` and `farthest_m` hold beside what the camera's path
+    /// says.
+    pub scene: Scene,
+    /// The kinds of trees; at least one.
+    pub species: Vec<Species>,
+    /// Side of the square around the origin that trees without places are strewn over, metres, 1 to
+    /// 100,000; default 300.
+    pub region_m: f64,
+    /// Points that the camera passes, with as many frames between each two; metres, y up. Default: a
+    /// walk across the region at a height of 1.7 m.
+    pub camera: Vec<Key>,
+    /// Frames of the path, 1 to 100,000; default 120.
+    pub frames: u32,
+    /// Levels beside the original, 1 to 12; default 4.
+    pub levels: u8,
+    /// Triangles that the worst frame may draw; default 0: no limit. Where the levels draw more, all
+    /// of them are moved nearer.
+    pub triangles_per_frame: u64,
+    /// Bytes that a texel takes on the GPU, 0.25 to 16: 4 for RGBA8 (default), 1 for BC7 or ASTC 4x4.
+    pub texel_bytes: f64,
+}
+
+/// One kind of tree.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Species {
+    /// The tree: .glb or .gltf.
+    pub input: PathBuf,
+    /// Trees that are strewn over the region, where no places are given.
+    pub count: u32,
+    /// A file of places: a line a tree, "x, y, z" or "x, y, z, scale", metres; a head line and lines
+    /// that begin with # are passed over.
+    pub places: Option<PathBuf>,
+}
+
+/// A point of the camera's path.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Key {
+    /// The eye, metres.
+    pub eye: [f32; 3],
+    /// What it looks at, metres.
+    pub target: [f32; 3],
+}
+
+impl Default for Spec {
+    fn default() -> Self {
+        Self {
+            scene: Scene::default(),
+            species: Vec::new(),
+            region_m: 300.0,
+            camera: Vec::new(),
+            frames: 120,
+            levels: 4,
+            triangles_per_frame: 0,
+            texel_bytes: 4.0,
+        }
+    }
+}
+
+impl Knobs for Spec {
+    const KIND: &'static str = "plan";
+
+    fn ranges(&self) -> Vec<Range> {
+        let range = |key, value, least, most| Range {
+            key,
+            value,
+            least,
+            most,
+        };
+        let mut out = vec![
+            range("region_m", self.region_m, 1.0, 100_000.0),
+            range("frames", self.frames.into(), 1.0, 100_000.0),
+            range("levels", self.levels.into(), 1.0, 12.0),
+            range("texel_bytes", self.texel_bytes, 0.25, 16.0),
+        ];
+        out.extend(self.scene.ranges());
+        let counts = self.species.iter().map(|s| f64::from(s.count));
+        out.extend(counts.map(|count| range("count", count, 0.0, 1e7)));
+        let points = self.camera.iter().flat_map(|k| [k.eye, k.target]);
+        out.extend(
+            points
+                .flatten()
+                .map(|v| range("camera", v.into(), -1e9, 1e9)),
+        );
+        out
+    }
+}
