@@ -6,6 +6,8 @@
 
 use std::path::{Path, PathBuf};
 
+use super::exchange::exchange;
+use super::leftovers;
 use super::manifest::{self, Manifest};
 use crate::error::{Error, Result};
 
@@ -31,6 +33,7 @@ impl Package {
     /// [`Error::Io`] where it can't be written. Both before any work is done.
     pub fn start(output: &Path, force: bool) -> Result<Self> {
         let output = std::path::absolute(output).map_err(|e| Error::io(output, "find", e))?;
+        leftovers::clear(&output);
         let old_files = replaced(&output, force)?;
         let Some((parent, name)) = output.parent().zip(output.file_name()) else {
             return Err(Error::usage(
@@ -40,9 +43,8 @@ impl Package {
         };
         let made = parent.ancestors().take_while(|p| !p.exists());
         let made = made.map(Path::to_path_buf).collect();
-        let draft = format!(".{}.pleach-{}", name.to_string_lossy(), std::process::id());
         let package = Self {
-            draft: parent.join(draft),
+            draft: parent.join(leftovers::draft_name(name)),
             made,
             old_files,
             committed: false,
@@ -116,8 +118,13 @@ impl Package {
         if !self.output.exists() {
             return std::fs::rename(&self.draft, &self.output);
         }
+        if exchange(&self.draft, &self.output).is_ok() {
+            return std::fs::remove_dir_all(&self.draft);
+        }
+        // Where the system can't: for a moment there is no package. `leftovers` puts it back if we
+        // are killed just then.
         let mut old = self.draft.clone().into_os_string();
-        old.push("-old");
+        old.push(leftovers::OLD);
         std::fs::rename(&self.output, &old)?;
         if let Err(error) = std::fs::rename(&self.draft, &self.output) {
             std::fs::rename(&old, &self.output)?;

@@ -1,0 +1,199 @@
+//! What happens to a package when a bake is killed, disturbed or starved.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// Name and bytes of every file.
+type Files = BTreeMap<String, Vec<u8>>;
+
+fn files(folder: &Path) -> Files {
+    let Ok(entries) = std::fs::read_dir(folder) else {
+        return Files::new();
+    };
+    entries
+        .map(|e| e.unwrap().path())
+        .map(|f| {
+            (
+                f.file_name().unwrap().to_string_lossy().into_owned(),
+                std::fs::read(&f).unwrap(),
+            )
+        })
+        .collect()
+}
+
+/// A small tree in a folder of its own.
+fn home() -> (tempfile::TempDir, PathBuf) {
+    let home = tempfile::tempdir().unwrap();
+    let tree = home.path().join("tree.glb");
+    let grown = Command::new(env!("CARGO_BIN_EXE_pleach"))
+        .args(["grow", "palm", "--leaves", "40", "-o"])
+        .arg(&tree)
+        .stdout(Stdio::null())
+        .status()
+        .unwrap();
+    assert!(grown.success());
+    // As little work as a bake can be.
+    std::fs::write(
+        tree.with_extension("recipe"),
+        "(training_views: 4, refine_rounds: 1)",
+    )
+    .unwrap();
+    std::fs::write(
+        tree.with_extension("scene"),
+        "(screen_height_px: 256, heights_px: [64, 32])",
+    )
+    .unwrap();
+    (home, tree)
+}
+
+fn start(tree: &Path, output: &Path, triangles: &str) -> Child {
+    let home = output.parent().unwrap();
+    Command::new(env!("CARGO_BIN_EXE_pleach"))
+        .args([
+            "bake",
+            "--preset",
+            "draft",
+            "--accept",
+            "--quiet",
+            "--triangles",
+            triangles,
+            "-o",
+        ])
+        .args([output, tree])
+        .arg("--recipe")
+        .arg(home.join("tree.recipe"))
+        .arg("--scene")
+        .arg(home.join("tree.scene"))
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap()
+}
+
+/// What is in a folder beside `known`.
+fn strangers(folder: &Path, known: &[&str]) -> Vec<String> {
+    let entries = std::fs::read_dir(folder).unwrap();
+    entries
+        .map(|e| e.unwrap().file_name().to_string_lossy().into_owned())
+        .filter(|name| !known.contains(&name.as_str()))
+        .collect()
+}
+
+const KNOWN: [&str; 7] = [
+    "tree.glb",
+    "tree.skeleton.ron",
+    "tree.recipe",
+    "tree.scene",
+    "a",
+    "b",
+    "out",
+];
+
+/// The two packages that the tests bake, and how long one takes.
+fn packages(home: &Path, tree: &Path) -> ([Files; 2], Duration) {
+    let started = Instant::now();
+    let both = [("a", "300"), ("b", "200,24")].map(|(name, triangles)| {
+        let folder = home.join(name);
+        assert!(start(tree, &folder, triangles).wait().unwrap().success());
+        files(&folder)
+    });
+    assert!(both[0].len() >= 5 && both[0] != both[1]);
+    (both, started.elapsed() / 2)
+}
+
+#[test]
+fn killed_at_any_moment_the_old_package_is_whole_or_the_new_one() {
+    let (home, tree) = home();
+    let (both, takes) = packages(home.path(), &tree);
+    let output = home.path().join("out");
+    assert!(start(&tree, &output, "300").wait().unwrap().success());
+    let mut kept = [0, 0];
+    for kill in 0..50u32 {
+        let triangles = ["200,24", "300"][kill as usize % 2];
+        let mut child = start(&tree, &output, triangles);
+        // Late moments more often than early ones: that is when files are written and moved.
+        let part = (f64::from(kill) * 0.618_034).fract().sqrt();
+        std::thread::sleep(takes.mul_f64(1.1 * part));
+        child.kill().unwrap();
+        child.wait().unwrap();
+        let found = files(&output);
+        match both.iter().position(|package| *package == found) {
+            Some(which) => kept[which] += 1,
+            None => panic!("kill {kill} left {:?}", found.keys()),
+        }
+    }
+    assert!(kept[0] + kept[1] == 50);
+    assert!(start(&tree, &output, "200,24").wait().unwrap().success());
+    assert!(files(&output) == both[1]);
+    if cfg!(target_os = "linux") {
+        assert_eq!(
+            strangers(home.path(), &KNOWN),
+            [""; 0],
+            "drafts of the dead are cleared"
+        );
+    }
+}
+
+#[test]
+fn two_bakes_into_one_folder_leave_one_of_their_packages_whole() {
+    let (home, tree) = home();
+    let (both, _) = packages(home.path(), &tree);
+    let output = home.path().join("out");
+    for round in 0..4 {
+        let mut at_once = [
+            start(&tree, &output, "300"),
+            start(&tree, &output, "200,24"),
+        ];
+        let ended = at_once.each_mut().map(|c| c.wait().unwrap().success());
+        assert!(ended.contains(&true), "round {round}");
+        assert!(both.contains(&files(&output)), "round {round}");
+    }
+    assert_eq!(strangers(home.path(), &KNOWN), [""; 0]);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_limit_of_file_sizes_leaves_the_old_package() {
+    let (home, tree) = home();
+    let (both, _) = packages(home.path(), &tree);
+    let output = home.path().join("a");
+    // Blocks of 512 bytes: too few for any level.
+    let script = "ulimit -f 8; exec \"$@\"";
+    let status = Command::new("sh")
+        .args([
+            "-c",
+            script,
+            "sh",
+            env!("CARGO_BIN_EXE_pleach"),
+            "bake",
+            "--quiet",
+            "-o",
+        ])
+        .args([&output, &tree])
+        .stderr(Stdio::null())
+        .status()
+        .unwrap();
+    assert!(!status.success());
+    assert!(files(&output) == both[0]);
+}
+
+#[test]
+fn names_with_spaces_quotes_and_other_letters_are_names() {
+    let (home, tree) = home();
+    for name in ["two words", "a 'quoted' one", "naïve-树", "100%25", "-dash"] {
+        let input = home.path().join(format!("{name}.glb"));
+        std::fs::copy(&tree, &input).unwrap();
+        let output = home.path().join(format!("of {name}"));
+        assert!(
+            start(&input, &output, "300").wait().unwrap().success(),
+            "{name}"
+        );
+        let found = files(&output);
+        assert!(
+            found.contains_key(&format!("{name}_LOD1.glb")),
+            "{:?}",
+            found.keys()
+        );
+    }
+}
