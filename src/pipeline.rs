@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use serde_json::Value;
 
-use crate::botany::load::{Limits, load, load_slice, read, references};
+use crate::botany::load::{load, load_slice, read, references};
 use crate::botany::model::Model;
 use crate::botany::recognise::{RecogniseOptions, recognise};
 use crate::botany::tree::Tree;
@@ -33,7 +33,7 @@ use crate::report::schema::{Instancing, Report};
 use crate::report::{Judged, Settings, heights, judge};
 use crate::scene::Scene;
 use crate::space::sha256::sha256;
-use crate::watch::{Watch, begin, part, step};
+use crate::watch::{Deadline, Watch, begin, part, step};
 
 /// What to bake.
 #[derive(Clone, Debug, Default)]
@@ -77,14 +77,20 @@ const REPORT_OFFSET_DEG: f32 = 11.0;
 /// See [`Error`]; whatever it is, the output folder is as it was.
 pub fn bake(request: &Request, watch: &dyn Watch) -> Result<Baked> {
     check(&request.recipe)?;
+    let deadline = Deadline::new(watch, request.recipe.most_seconds);
+    made(request, &deadline).map_err(|error| deadline.explain(error))
+}
+
+fn made(request: &Request, watch: &dyn Watch) -> Result<Baked> {
     check(&request.scene)?;
     request.recipe.packer.check()?;
     let package = Package::start(&request.output, request.force)?;
     begin(watch, "load", 1)?;
     // Read once, so that what is described is what is baked (files that it refers to are read twice).
-    let input = read(&request.input, &Limits::default())?;
+    let limits = &request.recipe.limits;
+    let input = read(&request.input, limits)?;
     let provenance = provenance(request, &input)?;
-    let model = load_slice(&input, &request.input, &Limits::default())?;
+    let model = load_slice(&input, &request.input, limits)?;
     drop(input);
     let rungs = rungs(
         &request.wanted,
@@ -147,7 +153,7 @@ pub fn bake(request: &Request, watch: &dyn Watch) -> Result<Baked> {
 /// Those of [`references`].
 pub fn provenance(request: &Request, input: &[u8]) -> Result<Provenance> {
     let name = request.input.file_name().unwrap_or_default();
-    let others = references(input, &request.input, &Limits::default())?;
+    let others = references(input, &request.input, &request.recipe.limits)?;
     let mut asked = request.wanted.to_string();
     if let Some(pixels) = request.max_error_px {
         asked += &format!(" --max-error {pixels}");
@@ -198,10 +204,7 @@ fn levels(
     let mut manifest = Manifest {
         format: FORMAT.into(),
         version: VERSION,
-        recipe: Recipe {
-            memory_mib: 0,
-            ..request.recipe.clone()
-        },
+        recipe: request.recipe.clone().as_described(),
         scene: request.scene.clone(),
         tree: describer.original(),
         subtree_texels: TEXELS,

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::botany::load::Limits;
 use crate::botany::recognise::OrganRule;
 use crate::error::{Error, Result};
 use crate::knobs::{Knobs, Range};
@@ -113,6 +114,12 @@ pub struct Recipe {
     pub instance_normals_deg: f64,
     /// Up to so many copies are plain nodes, more are EXT_mesh_gpu_instancing, 0 to 1,000,000.
     pub instance_nodes: u32,
+    /// What a file may hold at most: triangles (50,000,000), pixels of all images (2^29), nodes
+    /// (8,000,000), bytes (2^32). Changes no package.
+    pub limits: Limits,
+    /// Seconds that a bake may take, asked between its steps, 0 to 1,000,000; default 0: any.
+    /// Changes no package.
+    pub most_seconds: u32,
     /// Memory that the trees of a batch may take together, MiB, 0 to 1,048,576; 0: half of the
     /// machine's. Changes no package.
     pub memory_mib: u32,
@@ -157,6 +164,7 @@ impl Knobs for Recipe {
                 1_000_000.0,
             ),
             range("memory_mib", self.memory_mib.into(), 0.0, 1_048_576.0),
+            range("most_seconds", self.most_seconds.into(), 0.0, 1e6),
             range("training_views", self.training_views.into(), 4.0, 64.0),
         ]
     }
@@ -174,12 +182,17 @@ impl Recipe {
 
     /// Whether both make the same package.
     pub fn bakes_like(&self, other: &Self) -> bool {
-        let memory_mib = self.memory_mib;
-        let other = Self {
-            memory_mib,
-            ..other.clone()
-        };
-        *self == other
+        self.clone().as_described() == other.clone().as_described()
+    }
+
+    /// As a manifest says it: without what changes no package.
+    pub fn as_described(self) -> Self {
+        Self {
+            limits: Limits::default(),
+            most_seconds: 0,
+            memory_mib: 0,
+            ..self
+        }
     }
 
     /// A quick look.
@@ -225,6 +238,8 @@ impl Recipe {
             instance_tolerance: 1e-5,
             instance_normals_deg: 1.0,
             instance_nodes: 500,
+            limits: Limits::default(),
+            most_seconds: 0,
             memory_mib: 0,
         }
     }

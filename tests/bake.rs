@@ -512,3 +512,33 @@ fn ctrl_c_leaves_what_was_there() {
     assert_eq!(child.wait().unwrap().code(), Some(130));
     assert_eq!(names(place.home.path()), ["small.ron", "tree.glb"]);
 }
+
+#[test]
+fn limits_of_the_recipe_end_a_bake_and_are_named() {
+    let home = tempfile::tempdir().unwrap();
+    let path = |name: &str| home.path().join(name).to_string_lossy().into_owned();
+    let (tree, recipe, output) = (path("tree.glb"), path("r.ron"), path("out"));
+    small_tree(Path::new(&tree), 50);
+    let refused = |input: &str, text: &str| {
+        std::fs::write(&recipe, text).unwrap();
+        let out = pleach(&["bake", input, "-o", &output, "--recipe", &recipe]);
+        assert_eq!(out.status.code(), Some(2), "{text}");
+        assert!(!Path::new(&output).exists());
+        String::from_utf8(out.stderr).unwrap()
+    };
+    let said = refused(&tree, "(limits: (triangles: 20))");
+    assert!(said.contains("limit of 20 triangles"), "{said}");
+    assert!(
+        said.contains("raise triangles in the recipe's limits"),
+        "{said}"
+    );
+    let said = refused(&tree, "(limits: (bytes: 100))");
+    assert!(
+        said.contains("raise bytes in the recipe's limits"),
+        "{said}"
+    );
+    let said = refused(&tree, "(limits: (pixel: 100))");
+    assert!(said.contains("did you mean \"pixels\""), "{said}");
+    let said = refused("assets/oak.glb", "(most_seconds: 1)");
+    assert!(said.contains("longer than 1 seconds"), "{said}");
+}

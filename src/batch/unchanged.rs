@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::botany::load::{Limits, read};
+use crate::botany::load::read;
 use crate::export::manifest::{Manifest, SUFFIX};
 use crate::pipeline::{Request, provenance};
 
@@ -21,7 +21,7 @@ fn same(request: &Request) -> Option<bool> {
     let text = std::fs::read_to_string(&file).ok()?;
     let manifest = Manifest::from_ron(&text, &file).ok()?;
     let there = |name: &String| request.output.join(name).is_file();
-    let input = read(&request.input, &Limits::default()).ok()?;
+    let input = read(&request.input, &request.recipe.limits).ok()?;
     Some(
         manifest.recipe.bakes_like(&request.recipe)
             && manifest.scene == request.scene

@@ -1,5 +1,6 @@
 //! Geometry and rasters that know no botany.
 
+#[cfg(feature = "bake")]
 pub mod align;
 pub mod directions;
 #[cfg(feature = "bake")]

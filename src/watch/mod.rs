@@ -1,8 +1,10 @@
 //! Who watches a bake: told of every step, asked whether to go on.
 
 mod clock;
+mod deadline;
 
 pub use clock::Clock;
+pub use deadline::Deadline;
 
 use crate::error::{Error, Result};
 

@@ -149,7 +149,7 @@ impl<'a> Asset<'a> {
                 "{bytes} bytes are more than the limit of {}",
                 self.limits.bytes
             ),
-            "split the scene: one tree a file",
+            "split the scene: one tree a file; or raise bytes in the recipe's limits",
         ))
     }
 

@@ -70,7 +70,7 @@ pub(super) fn read_file(path: &Path, limits: &Limits) -> Result<Vec<u8>> {
                 meta.len(),
                 limits.bytes
             ),
-            "split the scene: one tree a file",
+            "split the scene: one tree a file; or raise bytes in the recipe's limits",
         ));
     }
     std::fs::read(path).map_err(io("read"))
@@ -125,7 +125,7 @@ fn check_size(text: &[u8], path: &Path, limits: &Limits) -> Result<()> {
         path,
         "JSON",
         format!("{} bytes with {objects} objects are too many", text.len()),
-        "join objects before the export, and export as .glb",
+        "join objects before the export, and export as .glb; or raise bytes and nodes in the recipe's limits",
     ))
 }
 

@@ -83,7 +83,11 @@ pub(super) fn decode_all(
                 "{width} x {height} texels are too many: all images together may have {}",
                 asset.limits.pixels
             );
-            return Err(asset.fault(place, what, "scale the textures down"));
+            return Err(asset.fault(
+                place,
+                what,
+                "scale the textures down; or raise pixels in the recipe's limits",
+            ));
         }
         pixels_left -= pixels;
         jobs.push((index, place, bytes, format, pixels));

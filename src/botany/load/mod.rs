@@ -39,7 +39,8 @@ use warning::Warnings;
 ///
 /// The defaults are far above any tree that was seen, and low enough that a broken or hostile
 /// file ends in an error instead of an exhausted machine.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields, default)]
 pub struct Limits {
     /// Triangles after instances are expanded.
     pub triangles: usize,

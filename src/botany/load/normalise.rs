@@ -94,7 +94,11 @@ fn totals(asset: &Asset, placements: &[Placement], parts: &Parts) -> Result<Tota
         let most = asset.limits.triangles;
         if totals.triangles > most || totals.vertices > u32::MAX as usize {
             let what = format!("the scene has more than the limit of {most} triangles");
-            return Err(asset.fault("scene", what, "split the scene: one tree a file"));
+            return Err(asset.fault(
+                "scene",
+                what,
+                "split the scene: one tree a file; or raise triangles in the recipe's limits",
+            ));
         }
     }
     Ok(totals)

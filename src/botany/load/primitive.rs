@@ -162,9 +162,11 @@ impl Reader<'_> {
         if count > *indices_left || vertex_count > u32::MAX as usize {
             let most = self.asset.limits.triangles;
             let what = format!("the file has more than the limit of {most} triangles");
-            return Err(self
-                .asset
-                .fault(&self.place, what, "split the scene: one tree a file"));
+            return Err(self.asset.fault(
+                &self.place,
+                what,
+                "split the scene: one tree a file; or raise triangles in the recipe's limits",
+            ));
         }
         *indices_left -= count;
         let Some(accessor) = accessor else {

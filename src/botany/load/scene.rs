@@ -82,7 +82,11 @@ fn roots(asset: &Asset, warnings: &mut Warnings) -> Result<Vec<usize>> {
     if json.nodes.len() > asset.limits.nodes {
         let (n, most) = (json.nodes.len(), asset.limits.nodes);
         let what = format!("{n} nodes are more than the limit of {most}");
-        return Err(asset.fault("nodes", what, "join objects before the export"));
+        return Err(asset.fault(
+            "nodes",
+            what,
+            "join objects before the export; or raise nodes in the recipe's limits",
+        ));
     }
     if let Some(scene) = json.scenes.get(json.scene.unwrap_or(0)) {
         if json.scenes.len() > 1 {
@@ -153,7 +157,11 @@ fn place_mesh(
     if objects > asset.limits.nodes {
         let most = asset.limits.nodes;
         let what = format!("more than {most} placed primitives");
-        return Err(asset.fault(place, what, "join objects before the export"));
+        return Err(asset.fault(
+            place,
+            what,
+            "join objects before the export; or raise nodes in the recipe's limits",
+        ));
     }
     let numbered = (0u32..).zip(instances);
     out.extend(numbered.map(|(instance, node_from_instance)| Placement {
@@ -185,7 +193,11 @@ fn instances(
             "{count} instances are more than the limit of {}",
             asset.limits.nodes
         );
-        return Err(asset.fault(place, what, "split the scene: one tree a file"));
+        return Err(asset.fault(
+            place,
+            what,
+            "split the scene: one tree a file; or raise nodes in the recipe's limits",
+        ));
     }
     let select: Vec<u32> = (0..count as u32).collect();
     let vec3 = |name: &str| {
