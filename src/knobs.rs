@@ -20,6 +20,18 @@ pub struct Range {
     pub most: f64,
 }
 
+impl Range {
+    /// Of a key with this value.
+    pub fn of(key: &'static str, value: impl Into<f64>, least: f64, most: f64) -> Self {
+        Self {
+            key,
+            value: value.into(),
+            least,
+            most,
+        }
+    }
+}
+
 /// A set of knobs that can be read from a file.
 pub trait Knobs: Serialize + DeserializeOwned {
     /// "recipe" or "scene", for messages.

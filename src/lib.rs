@@ -10,6 +10,10 @@
 //! export  levels -> package          projection, atlas, glTF, manifest
 //! report  package -> evidence        reads the files back, renders, measures
 //! ```
+//!
+//! `pipeline` is that way in one file. Around it: `batch` bakes many trees, `plan` says which levels a
+//! scene needs, `sweep` measures speed against accuracy, `study` repeats the papers' experiments on
+//! `runtime`, which is what an engine calls every frame.
 
 #[cfg(feature = "bake")]
 pub mod batch;
@@ -51,6 +55,8 @@ pub mod study;
 pub mod sweep;
 #[cfg(feature = "bake")]
 pub mod threads;
+#[cfg(feature = "bake")]
+pub mod verdict;
 #[cfg(feature = "bake")]
 pub mod watch;
 

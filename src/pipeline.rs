@@ -8,7 +8,7 @@ use crate::botany::load::{load, load_slice, read, references};
 use crate::botany::model::Model;
 use crate::botany::recognise::{RecogniseOptions, recognise};
 use crate::botany::tree::Tree;
-use crate::describe::{Describer, trunk};
+use crate::describe::Describer;
 use crate::detail::element::elements;
 use crate::detail::merge::merge;
 use crate::detail::optimal_distance::TEXELS;
@@ -21,18 +21,18 @@ use crate::export::manifest::{
     self, FORMAT, Manifest, Provenance, Range, Reference, SUFFIX, VERSION,
 };
 use crate::export::original::Original;
-use crate::export::package::Package;
+use crate::export::package::{Package, remove_beside};
 use crate::export::surface::{self, scene_of_model};
 use crate::knobs::check;
 use crate::ladder::{LEAST_TRIANGLES, Rung, WHOLE_TREE_TRIANGLES, ranges, rungs, seen};
 pub use crate::ladder::{Limit, Wanted};
 use crate::level::{Baker, LevelRequest, MASK_HEIGHT};
 use crate::recipe::{Method, Recipe};
-use crate::report::band::{Fault, Trunk, faults};
 use crate::report::schema::{Instancing, Report};
 use crate::report::{Judged, Settings, heights, judge};
 use crate::scene::Scene;
 use crate::space::sha256::sha256;
+use crate::verdict::{REFUSED, in_band, refusal};
 use crate::watch::{Deadline, Watch, begin, part, step};
 
 /// What to bake.
@@ -128,10 +128,12 @@ fn made(request: &Request, watch: &dyn Watch) -> Result<Baked> {
     if request.recipe.instancing {
         warnings.extend(alone(&tree, &request.recipe, report.instancing.as_ref()));
     }
-    warnings.extend(accept(
-        in_band(&tree, &rungs, &judged, &report),
-        request.accept,
-    )?);
+    let found = in_band(&tree, &rungs, &judged, &report);
+    if !found.is_empty() && !request.accept {
+        let beside = package.write_beside(REFUSED, to_json(&report)?.as_bytes())?;
+        return Err(refusal(&found, &beside));
+    }
+    warnings.extend(found.into_iter().map(|f| f.what));
     let manifest = Manifest {
         provenance,
         files: files.clone(),
@@ -140,6 +142,7 @@ fn made(request: &Request, watch: &dyn Watch) -> Result<Baked> {
     package.write("report.json", (to_json(&report)? + "\n").as_bytes())?;
     package.write(&files[files.len() - 1], manifest.to_ron()?.as_bytes())?;
     package.commit(&files)?;
+    remove_beside(&request.output, REFUSED);
     Ok(Baked {
         report,
         files,
@@ -361,36 +364,6 @@ fn measure(original: &Model, file: &str, judged: &[Judged], watch: &dyn Watch) -
         ..Settings::default()
     };
     judge((original, file), judged, &settings, || step(watch))
-}
-
-fn in_band(tree: &Tree, rungs: &[Rung], judged: &[Judged], report: &Report) -> Vec<Fault> {
-    let trunk = Trunk::new(&tree.model, &trunk(tree));
-    let mut out = Vec::new();
-    for ((rung, level), row) in rungs.iter().zip(judged).zip(&report.levels) {
-        if row.triangles > rung.triangles {
-            out.push(Fault {
-                what: format!(
-                    "level {} ({}): {} triangles, more than its limit of {}",
-                    row.level, row.file, row.triangles, rung.triangles
-                ),
-                help: "give --triangles a larger number".into(),
-            });
-        }
-        out.extend(faults(&tree.model, level, row, trunk.as_ref()));
-    }
-    out
-}
-
-/// Faults as warnings where they are accepted, else as one error.
-fn accept(faults: Vec<Fault>, accepted: bool) -> Result<Vec<String>> {
-    let lines: Vec<String> = faults.iter().map(|f| f.what.clone()).collect();
-    match faults.first() {
-        Some(first) if !accepted => Err(Error::Refused {
-            what: lines.join("\n  "),
-            help: format!("{}; --accept keeps the levels as they are", first.help),
-        }),
-        _ => Ok(lines),
-    }
 }
 
 /// The report as text.

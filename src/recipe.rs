@@ -135,37 +135,26 @@ impl Knobs for Recipe {
     const KIND: &'static str = "recipe";
 
     fn ranges(&self) -> Vec<Range> {
-        let range = |key, value, least, most| Range {
-            key,
-            value,
-            least,
-            most,
-        };
         vec![
-            range("locality", self.locality, 0.0, 1.0),
-            range("reassign_rounds", self.reassign_rounds.into(), 0.0, 100.0),
-            range("texel_density", self.texel_density.into(), 0.25, 4.0),
-            range("gutter_texels", self.gutter_texels.into(), 0.0, 16.0),
-            range("samples", self.samples.into(), 1.0, 8.0),
-            range("refine_rounds", self.refine_rounds.into(), 0.0, 100.0),
-            range("validity_px", self.validity_px, 0.1, 64.0),
-            range("tolerance", self.tolerance, 0.0, 1.0),
-            range("instance_tolerance", self.instance_tolerance, 0.0, 0.1),
-            range(
+            Range::of("locality", self.locality, 0.0, 1.0),
+            Range::of("reassign_rounds", self.reassign_rounds, 0.0, 100.0),
+            Range::of("texel_density", self.texel_density, 0.25, 4.0),
+            Range::of("gutter_texels", self.gutter_texels, 0.0, 16.0),
+            Range::of("samples", self.samples, 1.0, 8.0),
+            Range::of("refine_rounds", self.refine_rounds, 0.0, 100.0),
+            Range::of("validity_px", self.validity_px, 0.1, 64.0),
+            Range::of("tolerance", self.tolerance, 0.0, 1.0),
+            Range::of("instance_tolerance", self.instance_tolerance, 0.0, 0.1),
+            Range::of(
                 "instance_normals_deg",
                 self.instance_normals_deg,
                 0.0,
                 180.0,
             ),
-            range(
-                "instance_nodes",
-                self.instance_nodes.into(),
-                0.0,
-                1_000_000.0,
-            ),
-            range("memory_mib", self.memory_mib.into(), 0.0, 1_048_576.0),
-            range("most_seconds", self.most_seconds.into(), 0.0, 1e6),
-            range("training_views", self.training_views.into(), 4.0, 64.0),
+            Range::of("instance_nodes", self.instance_nodes, 0.0, 1_000_000.0),
+            Range::of("memory_mib", self.memory_mib, 0.0, 1_048_576.0),
+            Range::of("most_seconds", self.most_seconds, 0.0, 1e6),
+            Range::of("training_views", self.training_views, 4.0, 64.0),
         ]
     }
 }

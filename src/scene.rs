@@ -68,26 +68,15 @@ impl Knobs for Scene {
     const KIND: &'static str = "scene";
 
     fn ranges(&self) -> Vec<Range> {
-        let range = |key, value, least, most| Range {
-            key,
-            value,
-            least,
-            most,
-        };
         let mut out = vec![
-            range(
-                "screen_height_px",
-                self.screen_height_px.into(),
-                64.0,
-                16384.0,
-            ),
-            range("aspect", self.aspect, 0.25, 8.0),
-            range("fov_deg", self.fov_deg, 1.0, 170.0),
-            range("first_height_px", self.first_height_px, 8.0, 16384.0),
-            range("vanish_height_px", self.vanish_height_px, 0.0, 64.0),
-            range("fade", self.fade, 1.0, 2.0),
-            range("nearest_m", self.nearest_m, 0.0, 1e9),
-            range(
+            Range::of("screen_height_px", self.screen_height_px, 64.0, 16384.0),
+            Range::of("aspect", self.aspect, 0.25, 8.0),
+            Range::of("fov_deg", self.fov_deg, 1.0, 170.0),
+            Range::of("first_height_px", self.first_height_px, 8.0, 16384.0),
+            Range::of("vanish_height_px", self.vanish_height_px, 0.0, 64.0),
+            Range::of("fade", self.fade, 1.0, 2.0),
+            Range::of("nearest_m", self.nearest_m, 0.0, 1e9),
+            Range::of(
                 "farthest_m",
                 self.farthest_m,
                 if self.farthest_m == 0.0 {
@@ -100,7 +89,7 @@ impl Knobs for Scene {
         ];
         let mut nearer = 16384.0;
         for &height in &self.heights_px {
-            out.push(range("heights_px", height, 4.0, nearer));
+            out.push(Range::of("heights_px", height, 4.0, nearer));
             nearer = height / 1.01;
         }
         out

@@ -542,3 +542,72 @@ fn limits_of_the_recipe_end_a_bake_and_are_named() {
     let said = refused("assets/oak.glb", "(most_seconds: 1)");
     assert!(said.contains("longer than 1 seconds"), "{said}");
 }
+
+/// Shelves: level squares above and beside each other, which no upright card shows.
+fn shelves(file: &Path) {
+    let mut glb = GlbBuilder::default();
+    let (mut points, mut triangles) = (Vec::new(), Vec::new());
+    for i in 0..9u32 {
+        let at = points.len() as u32;
+        let middle = Vec3::new((i % 3) as f32 * 1.2, i as f32 * 0.4, (i / 3) as f32 * 1.2);
+        let corners = [[-0.5, -0.5], [-0.5, 0.5], [0.5, 0.5], [0.5, -0.5]];
+        points.extend(corners.map(|[x, z]| middle + Vec3::new(x, 0.0, z)));
+        triangles.extend([[at, at + 1, at + 2], [at, at + 2, at + 3]]);
+    }
+    let primitive = json!({
+        "attributes": { "POSITION": glb.positions(&points) },
+        "indices": glb.indices(&triangles, points.len()), "material": 0,
+    });
+    let bytes = glb.finish(json!({
+        "asset": { "version": "2.0" }, "scene": 0, "scenes": [{ "nodes": [0] }],
+        "nodes": [{ "mesh": 0 }], "meshes": [{ "primitives": [primitive] }],
+        "materials": [{ "name": "leaves", "doubleSided": true }],
+    }));
+    std::fs::write(file, bytes).unwrap();
+}
+
+#[test]
+fn a_bad_bake_is_refused_with_its_figures_beside_the_package() {
+    let home = tempfile::tempdir().unwrap();
+    let path = |name: &str| home.path().join(name).to_string_lossy().into_owned();
+    let (tree, recipe, output) = (path("shelves.glb"), path("r.ron"), path("out"));
+    shelves(Path::new(&tree));
+    std::fs::write(&recipe, "(method: CrossedQuads)").unwrap();
+    let args = [
+        "bake",
+        &tree,
+        "-o",
+        &output,
+        "--triangles",
+        "4",
+        "--recipe",
+        &recipe,
+    ];
+    let refused = pleach(&args);
+    assert_eq!(refused.status.code(), Some(3));
+    let said = String::from_utf8(refused.stderr).unwrap();
+    for part in [
+        "bake refused: level 1",
+        "covered area is",
+        "view",
+        "texel_density",
+        "--accept",
+    ] {
+        assert!(said.contains(part), "{part}: {said}");
+    }
+    assert!(!Path::new(&output).exists());
+    let beside = path("out.refused.json");
+    assert!(said.contains(&beside), "{said}");
+    let report: Report = serde_json::from_slice(&std::fs::read(&beside).unwrap()).unwrap();
+    let area = report.levels[0].sizes[0].area_ratio.mean;
+    assert!(!(0.8..=1.25).contains(&area), "{area}");
+    // What is accepted is a package, and the report on what was refused goes.
+    let accepted = pleach(&[&args[..], &["--accept"]].concat());
+    assert!(accepted.status.success());
+    assert!(
+        String::from_utf8(accepted.stderr)
+            .unwrap()
+            .contains("covered area is")
+    );
+    assert!(Path::new(&output).join("report.json").is_file() && !Path::new(&beside).exists());
+}

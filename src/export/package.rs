@@ -75,6 +75,16 @@ impl Package {
         std::fs::write(&file, bytes).map_err(|e| Error::io(&self.output.join(name), "write", e))
     }
 
+    /// Writes a file beside the package's folder, named after it; returns where. It stays.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn write_beside(&self, ending: &str, bytes: &[u8]) -> Result<PathBuf> {
+        let file = beside(&self.output, ending);
+        std::fs::write(&file, bytes).map_err(|e| Error::io(&file, "write", e))?;
+        Ok(file)
+    }
+
     /// Where a file that was written can be read back from.
     pub fn file(&self, name: &str) -> PathBuf {
         self.draft.join(name)
@@ -146,6 +156,18 @@ impl Package {
         }
         std::fs::remove_dir(&self.draft)
     }
+}
+
+fn beside(output: &Path, ending: &str) -> PathBuf {
+    let mut name = output.file_name().unwrap_or_default().to_os_string();
+    name.push(ending);
+    output.with_file_name(name)
+}
+
+/// Removes what [`Package::write_beside`] has left for the folder `output`, if it has.
+pub fn remove_beside(output: &Path, ending: &str) {
+    // It is of no use any more, and harms nobody where it can't be removed.
+    let _ = std::fs::remove_file(beside(output, ending));
 }
 
 impl Drop for Package {

@@ -76,27 +76,17 @@ impl Knobs for Spec {
     const KIND: &'static str = "plan";
 
     fn ranges(&self) -> Vec<Range> {
-        let range = |key, value, least, most| Range {
-            key,
-            value,
-            least,
-            most,
-        };
         let mut out = vec![
-            range("region_m", self.region_m, 1.0, 100_000.0),
-            range("frames", self.frames.into(), 1.0, 100_000.0),
-            range("levels", self.levels.into(), 1.0, 12.0),
-            range("texel_bytes", self.texel_bytes, 0.25, 16.0),
+            Range::of("region_m", self.region_m, 1.0, 100_000.0),
+            Range::of("frames", self.frames, 1.0, 100_000.0),
+            Range::of("levels", self.levels, 1.0, 12.0),
+            Range::of("texel_bytes", self.texel_bytes, 0.25, 16.0),
         ];
         out.extend(self.scene.ranges());
         let counts = self.species.iter().map(|s| f64::from(s.count));
-        out.extend(counts.map(|count| range("count", count, 0.0, 1e7)));
+        out.extend(counts.map(|count| Range::of("count", count, 0.0, 1e7)));
         let points = self.camera.iter().flat_map(|k| [k.eye, k.target]);
-        out.extend(
-            points
-                .flatten()
-                .map(|v| range("camera", v.into(), -1e9, 1e9)),
-        );
+        out.extend(points.flatten().map(|v| Range::of("camera", v, -1e9, 1e9)));
         out
     }
 }
