@@ -227,6 +227,8 @@ fn wrong_plans_are_refused_by_key_and_file() {
     assert!(refused("(species: [(input: \"t.glb\")])").contains("where it stands"));
     assert!(refused("(species: [(input: \"t.glb\", count: 1)])").contains("t.glb"));
     assert!(refused("(species: [(input: \"t.glb\", count: 1, places: \"p\")])").contains("both"));
+    let twice = "(input: \"t.glb\", count: 1)";
+    assert!(refused(&format!("(species: [{twice}, {twice}])")).contains("two species named t"));
     assert!(refused("(region_m: 0)").contains("region_m"));
     assert!(refused("(scene: (nearest_m: 50, farthest_m: 20))").contains("farthest_m"));
 }

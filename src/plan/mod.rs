@@ -25,7 +25,7 @@ pub use spec::{Key, Spec, Species};
 /// Most that levels are moved nearer for a budget.
 const NEAREST: f64 = 16.0;
 /// Texels of a level's page over the square of the tree's height in pixels where the level starts:
-/// between 8 and 16 for the trees of the README, since pages have sides that are powers of two.
+/// the feather palm of the README has 8, the sample oak 16. Sides of pages are powers of two.
 const TEXELS_PER_PIXEL: f64 = 12.0;
 /// Base colour, normals, and roughness with metalness and occlusion.
 const MAPS: f64 = 3.0;
@@ -127,6 +127,7 @@ pub fn plan(spec: &Spec, folder: &Path) -> Result<Answer> {
             "write species: [(input: \"oak.glb\", count: 100)]",
         ));
     }
+    names_differ(spec)?;
     let kinds: Vec<Kind> = (spec.species.iter().enumerate())
         .map(|(index, species)| Kind::read(spec, index, species, folder))
         .collect::<Result<_>>()?;
@@ -157,6 +158,22 @@ pub fn plan(spec: &Spec, folder: &Path) -> Result<Answer> {
     }
     answer.add_up();
     Ok(answer)
+}
+
+/// Two species of one name would be baked into one folder, the second over the first.
+fn names_differ(spec: &Spec) -> Result<()> {
+    let mut names = std::collections::BTreeSet::new();
+    for species in &spec.species {
+        let name = species.input.file_stem().unwrap_or_default();
+        // Some file systems take upper and lower case for the same.
+        if !names.insert(name.to_string_lossy().to_lowercase()) {
+            return Err(Error::usage(
+                format!("the plan has two species named {}", name.display()),
+                "write all places of a tree into one file, or rename one of the trees",
+            ));
+        }
+    }
+    Ok(())
 }
 
 /// The least move at which the worst frame keeps the budget, and what the frames show then.
