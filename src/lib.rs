@@ -18,6 +18,8 @@
 #[cfg(feature = "bake")]
 pub mod batch;
 #[cfg(feature = "bake")]
+mod beside;
+#[cfg(feature = "bake")]
 pub mod botany;
 #[cfg(feature = "bake")]
 pub mod cli;
@@ -55,6 +57,8 @@ pub mod study;
 pub mod sweep;
 #[cfg(feature = "bake")]
 pub mod threads;
+#[cfg(feature = "bake")]
+pub mod tiles;
 #[cfg(feature = "bake")]
 pub mod verdict;
 #[cfg(feature = "bake")]

@@ -1,9 +1,11 @@
 //! The bake: every step in order, one line each. Read this first.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use serde_json::Value;
 
+use crate::beside::{alone, hierarchy, instanced, told};
 use crate::botany::load::{load, load_slice, read, references};
 use crate::botany::model::Model;
 use crate::botany::recognise::{RecogniseOptions, recognise};
@@ -15,20 +17,20 @@ use crate::detail::optimal_distance::TEXELS;
 use crate::detail::wood::Wood;
 use crate::error::{Error, Result};
 use crate::export::combined::{Packed, extras, write_combined};
-use crate::export::gltf::{encode_images, write_glb};
-use crate::export::instanced::{copies_but_for_normals, write_instanced};
+use crate::export::gltf::write_glb;
 use crate::export::manifest::{
     self, FORMAT, Manifest, Provenance, Range, Reference, SUFFIX, VERSION,
 };
 use crate::export::original::Original;
 use crate::export::package::{Package, remove_beside};
+use crate::export::png::encode_images;
 use crate::export::surface::{self, scene_of_model};
 use crate::knobs::check;
 use crate::ladder::{LEAST_TRIANGLES, Rung, WHOLE_TREE_TRIANGLES, ranges, rungs, seen};
 pub use crate::ladder::{Limit, Wanted};
 use crate::level::{Baker, LevelRequest, MASK_HEIGHT};
 use crate::recipe::{Method, Recipe};
-use crate::report::schema::{Instancing, Report};
+use crate::report::schema::Report;
 use crate::report::{Judged, Settings, heights, judge};
 use crate::scene::Scene;
 use crate::space::sha256::sha256;
@@ -118,10 +120,21 @@ fn made(request: &Request, watch: &dyn Watch) -> Result<Baked> {
         true => instanced(&package, &tree, &request.recipe, &packed[0], &mut files)?,
         false => None,
     };
+    let tiles = match request.recipe.hierarchy {
+        true => Some(hierarchy(
+            &package,
+            &tree,
+            (&request.recipe, &request.scene),
+            &mut files,
+            watch,
+        )?),
+        false => None,
+    };
     let judged = read_back(&package, &packed[1..], &rungs)?;
     begin(watch, "measure", heights(&judged).len() as u64)?;
     let report = Report {
         instancing,
+        hierarchy: tiles.as_ref().map(told),
         ..measure(&tree.model, &files[0], &judged, watch)?
     };
     let mut warnings = levels.tree.warnings.clone();
@@ -137,6 +150,7 @@ fn made(request: &Request, watch: &dyn Watch) -> Result<Baked> {
     let manifest = Manifest {
         provenance,
         files: files.clone(),
+        tiles,
         ..levels
     };
     package.write("report.json", (to_json(&report)? + "\n").as_bytes())?;
@@ -240,11 +254,11 @@ fn levels(
                 .triangles_within(pixels, rung.height_px)
                 .max(WHOLE_TREE_TRIANGLES)
         });
-        let level_wanted = LevelRequest {
+        let rung = Rung {
             triangles: rung.triangles.min(enough),
-            height_px: rung.height_px as f32,
-            end_px: rung.end_px as f32,
+            ..*rung
         };
+        let level_wanted = LevelRequest::of(&rung, request.recipe.method);
         let made = baker.level(level_wanted, watch)?;
         part(watch, "encode")?;
         let described = describer.level(level, &(name(level) + ".glb"), &made, range);
@@ -266,7 +280,7 @@ fn levels(
 fn encoded(mut scene: surface::Scene) -> Result<(Vec<Vec<u8>>, surface::Scene)> {
     let pngs = encode_images(&scene)?;
     for image in &mut scene.images {
-        image.rgba = Vec::new();
+        image.rgba = Arc::default();
     }
     Ok((pngs, scene))
 }
@@ -293,52 +307,6 @@ fn write(
     files.extend([all, "report.json".into(), tree.model.name.clone() + SUFFIX]);
     step(watch)?;
     Ok(files)
-}
-
-/// Writes level 0 as prototypes and copies, if its leaves repeat.
-fn instanced(
-    package: &Package,
-    tree: &Tree,
-    recipe: &Recipe,
-    plain: &Packed,
-    files: &mut Vec<String>,
-) -> Result<Option<Instancing>> {
-    let Some((bytes, told)) = write_instanced(tree, recipe, plain.extras.clone())? else {
-        return Ok(None);
-    };
-    let file = format!("{}_instanced.glb", tree.model.name);
-    package.write(&file, &bytes)?;
-    let plain = package.file(&files[0]);
-    let plain_file_bytes = std::fs::metadata(&plain).map_err(|e| Error::io(&plain, "read", e))?;
-    // The manifest stays last: who finds it finds all the others.
-    files.insert(files.len() - 1, file.clone());
-    Ok(Some(Instancing {
-        file,
-        plain_file_bytes: plain_file_bytes.len(),
-        ..told
-    }))
-}
-
-/// What keeps leaves from being copies, where it is most of them.
-fn alone(tree: &Tree, recipe: &Recipe, instancing: Option<&Instancing>) -> Option<String> {
-    let (leaves, copies) = (
-        tree.leaves.len(),
-        instancing.map_or(0, |i| i.copies as usize),
-    );
-    if 2 * copies >= leaves {
-        return None;
-    }
-    let shapes = copies_but_for_normals(tree, recipe);
-    let help = match shapes > 2 * copies {
-        true => format!(
-            "; {shapes} have the shape but not the normals of another \
-             (recipe: instance_normals_deg: 180 shares them)"
-        ),
-        false => String::new(),
-    };
-    Some(format!(
-        "only {copies} of {leaves} leaves are exact copies of others{help}"
-    ))
 }
 
 /// Loads the levels as an engine would: from their files.

@@ -114,6 +114,13 @@ pub struct Recipe {
     pub instance_normals_deg: f64,
     /// Up to so many copies are plain nodes, more are EXT_mesh_gpu_instancing, 0 to 1,000,000.
     pub instance_nodes: u32,
+    /// Whether the hierarchy of sub-trees is written, too: as nodes of one file, and as 3D Tiles.
+    pub hierarchy: bool,
+    /// Triangles that stand for a sub-tree of that hierarchy, 8 to 4096.
+    pub tile_triangles: u32,
+    /// Error (root mean square) of such a stand-in where it takes over, pixels, 0.25 to 16; one of its
+    /// texels is at most one pixel there.
+    pub tile_error_px: f64,
     /// What a file may hold at most: triangles (50,000,000), pixels of all images (2^29), nodes
     /// (8,000,000), bytes (2^32). Changes no package.
     pub limits: Limits,
@@ -152,6 +159,8 @@ impl Knobs for Recipe {
                 180.0,
             ),
             Range::of("instance_nodes", self.instance_nodes, 0.0, 1_000_000.0),
+            Range::of("tile_triangles", self.tile_triangles, 8.0, 4096.0),
+            Range::of("tile_error_px", self.tile_error_px, 0.25, 16.0),
             Range::of("memory_mib", self.memory_mib, 0.0, 1_048_576.0),
             Range::of("most_seconds", self.most_seconds, 0.0, 1e6),
             Range::of("training_views", self.training_views, 4.0, 64.0),
@@ -227,6 +236,9 @@ impl Recipe {
             instance_tolerance: 1e-5,
             instance_normals_deg: 1.0,
             instance_nodes: 500,
+            hierarchy: false,
+            tile_triangles: 48,
+            tile_error_px: 2.0,
             limits: Limits::default(),
             most_seconds: 0,
             memory_mib: 0,

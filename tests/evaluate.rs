@@ -135,7 +135,8 @@ fn a_client_loses_area_where_mips_thin_the_leaves() {
     // Leaves that cover a fifth of their quads: their mips fall under the cutoff.
     let rgba = (0..64 * 64)
         .flat_map(|i| [90, 120, 40, if i % 64 % 16 < 3 { 255 } else { 0 }])
-        .collect();
+        .collect::<Vec<u8>>()
+        .into();
     original.images.push(Image {
         width: 64,
         height: 64,
@@ -262,7 +263,7 @@ fn a_normal_map_turns_the_surface_it_is_on() {
     wall.images.push(Image {
         width: 1,
         height: 1,
-        rgba: vec![128, 218, 218, 255],
+        rgba: vec![128, 218, 218, 255].into(),
         ..Image::default()
     });
     wall.materials[0].normal = Some(TextureRef {

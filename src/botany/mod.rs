@@ -1,6 +1,7 @@
 //! STEP 1: a glTF file becomes a [`Tree`].
 
 pub mod attach;
+pub mod branch;
 pub mod grow;
 pub mod leaf;
 pub mod load;

@@ -1,5 +1,7 @@
 //! The polygons of a tree as they were read: one indexed triangle list in normalised space.
 
+use std::sync::Arc;
+
 use glam::{DVec3, Vec2, Vec3};
 
 /// The least height that sizes on the screen are stated by, normalised units: a picture of a carpet
@@ -180,8 +182,9 @@ pub struct Image {
     pub width: u32,
     /// Height in texels.
     pub height: u32,
-    /// Straight (not premultiplied) RGBA, 4 bytes a texel, rows from the top.
-    pub rgba: Vec<u8>,
+    /// Straight (not premultiplied) RGBA, 4 bytes a texel, rows from the top; copies of an image
+    /// share them.
+    pub rgba: Arc<Vec<u8>>,
 }
 
 impl std::fmt::Debug for Image {
@@ -210,7 +213,7 @@ impl Model {
             kept[texture.image as usize] = true;
         }
         for (image, _) in self.images.iter_mut().zip(kept).filter(|(_, kept)| !kept) {
-            image.rgba = Vec::new();
+            image.rgba = Arc::default();
         }
     }
 

@@ -53,6 +53,10 @@ pub struct Args {
     /// Write level 0 also as prototypes of leaves and their places (NAME_instanced.glb).
     #[arg(long)]
     instancing: bool,
+    /// Also bake billboards for every sub-tree that a cut may use, as nodes of one file (NAME_hierarchy.glb) and as
+    /// 3D Tiles (NAME_tileset.json).
+    #[arg(long)]
+    hierarchy: bool,
     /// Keep levels that left their band instead of refusing the bake.
     #[arg(long)]
     accept: bool,
@@ -131,6 +135,7 @@ fn request(args: &Args) -> Result<Request> {
             };
             Recipe {
                 instancing: recipe.instancing || args.instancing,
+                hierarchy: recipe.hierarchy || args.hierarchy,
                 ..recipe
             }
         },
@@ -200,6 +205,17 @@ fn table(baked: &Baked, took: &Bake, request: &Request) -> String {
             instanced.prototypes,
             mib(instanced.file_bytes),
             mib(instanced.plain_file_bytes),
+        );
+    }
+    if let Some(hierarchy) = &baked.report.hierarchy {
+        out += &format!(
+            "\n{}, {}: {} tiles, {} billboard triangles on {} x {} texels\n",
+            hierarchy.file,
+            hierarchy.tileset,
+            hierarchy.tiles,
+            hierarchy.billboard_triangles,
+            hierarchy.atlas[0],
+            hierarchy.atlas[1],
         );
     }
     out += &format!(

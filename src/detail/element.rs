@@ -115,7 +115,7 @@ pub fn elements(tree: &Tree) -> Vec<Element> {
     out
 }
 
-fn subtree_of_chain(tree: &Tree) -> Vec<u32> {
+pub(super) fn subtree_of_chain(tree: &Tree) -> Vec<u32> {
     let mut out = vec![0; tree.skeleton.chains.len()];
     for (index, subtree) in tree.subtrees.iter().enumerate() {
         if let Some(chain) = subtree.chain {

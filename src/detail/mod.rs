@@ -9,5 +9,6 @@ pub mod opaque;
 pub mod optimal_cut;
 pub mod optimal_distance;
 pub mod reassign;
+pub mod tiles;
 pub mod whole_tree;
 pub mod wood;

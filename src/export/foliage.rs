@@ -1,5 +1,7 @@
 //! Bakes the cards of a level: charts, atlas, projected maps, and the mesh that shows them.
 
+use std::sync::Arc;
+
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
@@ -142,50 +144,54 @@ impl Foliage {
             name: name.into(),
             width: self.size[0],
             height: self.size[1],
-            rgba: self
-                .texels
-                .iter()
-                .zip(&self.alpha)
-                .flat_map(|(t, &a)| pixel(t, a))
-                .collect(),
+            rgba: Arc::new(
+                self.texels
+                    .iter()
+                    .zip(&self.alpha)
+                    .flat_map(|(t, &a)| pixel(t, a))
+                    .collect(),
+            ),
         };
         let byte = |v: f32| (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8;
         [
-            page("foliage_base_color", &|t, a| {
+            page(IMAGES[0], &|t, a| {
                 let [r, g, b] = t.color().to_array().map(srgb);
                 [r, g, b, a]
             }),
-            page("foliage_normal", &|t, _| {
+            page(IMAGES[1], &|t, _| {
                 let n = t.normal().normalize_or(Vec3::Z) * 0.5 + 0.5;
                 [byte(n.x), byte(n.y), byte(n.z), 255]
             }),
-            page("foliage_orm", &|t, _| {
+            page(IMAGES[2], &|t, _| {
                 let [o, r, m] = t.orm().to_array().map(byte);
                 [o, r, m, 255]
             }),
         ]
     }
+}
 
-    /// The material of the cards; its images are numbered from `first_image`.
-    pub fn material(&self, first_image: u32) -> Material {
-        let texture = |k: u32| {
-            Some(TextureRef {
-                image: first_image + k,
-                uv_set: 0,
-                wrap: [Wrap::Clamp; 2],
-                linear: true,
-            })
-        };
-        Material {
-            name: "foliage".into(),
-            base_color: texture(0),
-            normal: texture(1),
-            metallic_roughness: texture(2),
-            occlusion: texture(2),
-            alpha_mode: AlphaMode::Mask,
-            alpha_cutoff: 0.5,
-            double_sided: true,
-            ..Material::default()
-        }
+/// Names of the images of [`Foliage::images`].
+pub const IMAGES: [&str; 3] = ["foliage_base_color", "foliage_normal", "foliage_orm"];
+
+/// The material of the cards; its images are numbered from `first_image`.
+pub fn material(first_image: u32) -> Material {
+    let texture = |k: u32| {
+        Some(TextureRef {
+            image: first_image + k,
+            uv_set: 0,
+            wrap: [Wrap::Clamp; 2],
+            linear: true,
+        })
+    };
+    Material {
+        name: "foliage".into(),
+        base_color: texture(0),
+        normal: texture(1),
+        metallic_roughness: texture(2),
+        occlusion: texture(2),
+        alpha_mode: AlphaMode::Mask,
+        alpha_cutoff: 0.5,
+        double_sided: true,
+        ..Material::default()
     }
 }

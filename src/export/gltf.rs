@@ -4,12 +4,11 @@
 //! shows right. The root node holds the similarity from normalised space back to the world.
 
 use glam::Vec3;
-use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 
 use super::surface::{Scene, Surface, textures_of};
 use super::tangent::tangents;
-use crate::botany::model::{AlphaMode, Frame, Image, Material, TextureRef, Wrap};
+use crate::botany::model::{AlphaMode, Frame, Material, TextureRef, Wrap};
 use crate::error::{Error, Result};
 use crate::space::glb::GlbBuilder;
 use crate::space::sha256::sha256;
@@ -28,11 +27,6 @@ pub fn write_glb(
     Ok(file.finish(vec![node]))
 }
 
-/// All images of a scene as PNG, in order.
-pub fn encode_images(scene: &Scene) -> Result<Vec<Vec<u8>>> {
-    scene.images.par_iter().map(encode_png).collect()
-}
-
 /// Collects what goes into one file; several levels may share it.
 #[derive(Default)]
 pub struct FileBuilder {
@@ -43,7 +37,7 @@ pub struct FileBuilder {
     materials: Vec<Value>,
     textures: Vec<Value>,
     images: Vec<Value>,
-    /// SHA-256 of each image.
+    /// SHA-256 of each image; of those in files of their own the name.
     digests: Vec<String>,
     samplers: Vec<Value>,
     unlit: bool,
@@ -75,6 +69,28 @@ impl FileBuilder {
                 find_or_push(&mut self.materials, value)
             })
             .collect()
+    }
+
+    /// Adds those of a scene's materials that `surfaces` use, with images in files of their own
+    /// (`uris`); returns the number of each material in the file, of unused ones 0.
+    pub fn linked_materials(
+        &mut self,
+        scene: &Scene,
+        surfaces: &[Surface],
+        uris: &[&str],
+    ) -> Vec<usize> {
+        let mut numbers = vec![0; scene.materials.len()];
+        let mut images = vec![0; scene.images.len()];
+        for surface in surfaces {
+            let mut material = scene.materials[surface.material as usize].clone();
+            for texture in textures_of(&mut material).into_iter().flatten() {
+                let image = texture.image as usize;
+                images[image] = self.linked_image(&scene.images[image].name, uris[image]);
+            }
+            let value = self.material(&material, &images);
+            numbers[surface.material as usize] = find_or_push(&mut self.materials, value);
+        }
+        numbers
     }
 
     /// Adds surfaces as one mesh and returns its index; `numbers` are those of their materials in
@@ -142,6 +158,20 @@ impl FileBuilder {
         self.images.len() - 1
     }
 
+    fn linked_image(&mut self, name: &str, uri: &str) -> usize {
+        // A name is no digest: both kinds share one list.
+        if let Some(index) = self.digests.iter().position(|d| d == uri) {
+            return index;
+        }
+        let mut entry = json!({ "uri": uri });
+        if !name.is_empty() {
+            entry["name"] = json!(name);
+        }
+        self.images.push(entry);
+        self.digests.push(uri.into());
+        self.images.len() - 1
+    }
+
     /// Adds a node that places a mesh in the world and returns its index.
     pub fn node(&mut self, name: &str, mesh: usize, frame: &Frame, extras: Value) -> usize {
         let node = json!({ "name": name, "mesh": mesh });
@@ -199,7 +229,17 @@ impl FileBuilder {
     }
 
     /// The file with a scene of the given nodes.
-    pub fn finish(mut self, scene_nodes: Vec<usize>) -> Vec<u8> {
+    pub fn finish(self, scene_nodes: Vec<usize>) -> Vec<u8> {
+        self.with_scenes(vec![json!({ "nodes": scene_nodes })])
+    }
+
+    /// The file with several scenes by name, the first of which is shown; no node is in two.
+    pub fn finish_scenes(self, scenes: &[(&str, Vec<usize>)]) -> Vec<u8> {
+        let scene = |(name, nodes): &(&str, Vec<usize>)| json!({ "name": name, "nodes": nodes });
+        self.with_scenes(scenes.iter().map(scene).collect())
+    }
+
+    fn with_scenes(mut self, scenes: Vec<Value>) -> Vec<u8> {
         if self.unlit {
             self.use_extension("KHR_materials_unlit");
         }
@@ -207,7 +247,7 @@ impl FileBuilder {
         let mut root = json!({
             "asset": { "version": "2.0", "generator": generator },
             "scene": 0,
-            "scenes": [{ "nodes": scene_nodes }],
+            "scenes": scenes,
             "nodes": self.nodes,
             "meshes": self.meshes,
             "materials": self.materials,
@@ -346,35 +386,4 @@ fn find_or_push(list: &mut Vec<Value>, value: Value) -> usize {
             list.len() - 1
         }
     }
-}
-
-/// PNG without an alpha channel where every texel is opaque.
-pub fn encode_png(image: &Image) -> Result<Vec<u8>> {
-    let fail = |error: png::EncodingError| Error::Internal {
-        step: "encode PNG",
-        what: error.to_string(),
-    };
-    let opaque = image.rgba.chunks_exact(4).all(|t| t[3] == 255);
-    let mut out = Vec::new();
-    let mut encoder = png::Encoder::new(&mut out, image.width, image.height);
-    encoder.set_depth(png::BitDepth::Eight);
-    encoder.set_color(if opaque {
-        png::ColorType::Rgb
-    } else {
-        png::ColorType::Rgba
-    });
-    encoder.set_compression(png::Compression::Balanced);
-    let mut writer = encoder.write_header().map_err(fail)?;
-    if opaque {
-        let rgb: Vec<u8> = image
-            .rgba
-            .chunks_exact(4)
-            .flat_map(|t| [t[0], t[1], t[2]])
-            .collect();
-        writer.write_image_data(&rgb).map_err(fail)?;
-    } else {
-        writer.write_image_data(&image.rgba).map_err(fail)?;
-    }
-    writer.finish().map_err(fail)?;
-    Ok(out)
 }

@@ -6,7 +6,8 @@
 use glam::Vec3;
 use serde_json::{Value, json};
 
-use super::gltf::{FileBuilder, encode_images};
+use super::gltf::FileBuilder;
+use super::png::encode_images;
 use super::surface::scene_of_groups;
 use crate::botany::prototype::{Alike, Placed, Prototype, prototypes};
 use crate::botany::tree::Tree;

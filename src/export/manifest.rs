@@ -9,6 +9,7 @@ use std::path::Path;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
+use super::manifest_tiles::Tiles;
 use crate::error::{Error, Result};
 use crate::recipe::Recipe;
 use crate::runtime::{self, Hierarchy, OwnLeaves};
@@ -44,6 +45,9 @@ pub struct Manifest {
     pub subtree_texels: u32,
     /// The hierarchy of sub-trees: parents before children; 0 is the whole tree.
     pub subtrees: Vec<Subtree>,
+    /// The hierarchy as it is written, by `--hierarchy`.
+    #[serde(default)]
+    pub tiles: Option<Tiles>,
 }
 
 /// What a package was made from.

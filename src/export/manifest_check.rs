@@ -24,6 +24,7 @@ pub(super) fn flaw(manifest: &Manifest) -> Option<(String, String)> {
             subtrees
                 .find_map(|(i, s)| of_numbers(i, s).or_else(|| of_links(i, s, &manifest.subtrees)))
         })
+        .or_else(|| manifest.tiles.as_ref()?.flaw(manifest.subtrees.len()))
         .or_else(|| {
             let none = manifest.subtrees.is_empty();
             none.then(|| {

@@ -1,5 +1,7 @@
 //! Halves images as a mip chain does.
 
+use std::sync::Arc;
+
 use crate::botany::model::Image;
 use crate::space::texture::{linear, srgb};
 
@@ -48,7 +50,7 @@ fn halved(image: &Image, decode: impl Fn(u8) -> f32, encode: impl Fn(f32) -> u8)
         name: image.name.clone(),
         width: w,
         height: h,
-        rgba,
+        rgba: Arc::new(rgba),
     }
 }
 
@@ -68,10 +70,11 @@ mod tests {
                 [200, 100, 50, 255],
                 [0, 0, 0, 0],
             ]
-            .concat(),
+            .concat()
+            .into(),
         };
         shrink(&mut image, 1, true);
-        assert_eq!(image.rgba, [200, 100, 50, 128]);
+        assert_eq!(image.rgba[..], [200, 100, 50, 128]);
     }
 
     #[test]
@@ -82,7 +85,7 @@ mod tests {
                 name: String::new(),
                 width: 2,
                 height: 1,
-                rgba: [texel(0), texel(200)].concat(),
+                rgba: Arc::new([texel(0), texel(200)].concat()),
             };
             shrink(&mut image, 1, colored);
             image.rgba[0]

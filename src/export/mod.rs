@@ -1,24 +1,29 @@
 //! STEP 4: levels become a package on disk.
 
 pub mod atlas;
+pub mod blocks;
 pub mod chart;
 pub mod combined;
 pub mod edge;
 mod exchange;
 pub mod foliage;
 pub mod gltf;
+pub mod hierarchy;
 pub mod instanced;
 mod leftovers;
 pub mod manifest;
 mod manifest_check;
+pub mod manifest_tiles;
 pub mod matching;
 pub mod mip;
 pub mod original;
 pub mod package;
+pub mod png;
 pub mod project;
 pub mod refine;
 pub mod surface;
 pub mod tangent;
 pub mod texel;
+pub mod tileset;
 #[cfg(feature = "xatlas")]
 pub mod xatlas;

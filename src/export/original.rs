@@ -92,6 +92,11 @@ impl Original {
         }
     }
 
+    /// Height of the tree in samples of its masks.
+    pub fn height_samples(&self) -> f32 {
+        self.samples_per_unit * self.height
+    }
+
     /// Covered area in normalised units squared, one for each direction.
     pub fn areas(&self) -> Vec<f64> {
         let unit = f64::from(self.samples_per_unit);

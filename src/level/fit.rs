@@ -2,25 +2,27 @@
 
 use glam::Vec2;
 
-use super::{Baker, Level, LevelRequest, WHOLE_TREE_TRIANGLES};
+use super::{Baker, Level, LevelRequest};
 use crate::detail::level::LevelPlan;
 use crate::error::Result;
 use crate::export::atlas::Layout;
-use crate::export::foliage::{BakeOptions, Foliage};
+use crate::export::foliage::{self, BakeOptions, Foliage};
 use crate::export::matching::{AreaGoal, CONTRAST_GUESS, LevelScene, Matched, match_area};
 use crate::export::mip::shrink;
 use crate::export::original::{Original, camera};
 use crate::export::refine::{Refine, refine};
 use crate::export::surface::{Scene, Surface, scene_of_wood};
-use crate::recipe::Method;
 use crate::space::raster::{self, Camera};
 use crate::watch::{Watch, part};
 
 /// Height of the original's masks in samples.
 pub const MASK_HEIGHT: f32 = 1024.0;
 
-/// Height of the tree in pixels where the supersampled area is matched: it hardly depends on it.
-const NEAR_HEIGHT_PX: f32 = 320.0;
+/// Height of the tree in pixels where the supersampled area is matched: it hardly depends on it,
+/// so that five pixels a texel are enough, and so is this.
+fn near_height_px(request: LevelRequest) -> f32 {
+    (5.0 * request.height_texels).min(320.0)
+}
 
 /// Of the training directions every third one is matched in area; every sixth one where the
 /// level is largest on the screen.
@@ -34,6 +36,7 @@ const WOOD_TOLERANCE: f64 = 0.005;
 
 /// A plan with its wood and texels.
 pub struct Fitted {
+    request: LevelRequest,
     plan: LevelPlan,
     wood: Scene,
     foliage: Foliage,
@@ -48,11 +51,8 @@ impl Baker<'_> {
         request: LevelRequest,
         watch: &dyn Watch,
     ) -> Result<Fitted> {
-        let whole =
-            request.triangles <= WHOLE_TREE_TRIANGLES && self.recipe.method != Method::CrossedQuads;
-        // Levels are looked at from nearer than they are made for: never fewer texels than this.
-        let texels_px = request.height_px.max(if whole { 64.0 } else { 256.0 });
-        let density = texels_px / self.original.height * self.recipe.texel_density;
+        let request = request.no_nearer_than(self.rms_error(&plan), self.original.height);
+        let density = request.height_texels / self.original.height * self.recipe.texel_density;
         part(watch, "project")?;
         let mut foliage = Foliage::bake(
             &self.tree.model,
@@ -66,9 +66,10 @@ impl Baker<'_> {
                 samples: self.recipe.samples,
             },
         );
-        let goal = self.goal(request.height_px);
+        let goal = self.goal(request);
         // Cells about as large as texels: finer ones cost as their square, and no texel can follow.
-        let pool = (MASK_HEIGHT / texels_px).round().clamp(2.0, 4.0) as u32;
+        let samples = self.original.height_samples() / request.height_texels;
+        let pool = samples.round().clamp(2.0, 4.0) as u32;
         // Where the wood alone covers more than the original, no alpha can make up for it (bare
         // trees): then the tubes become thinner, and the cards are fitted again.
         let mut radius_scale = 1.0f32;
@@ -92,6 +93,7 @@ impl Baker<'_> {
             let over = matched.near_ratio;
             if tries == WOOD_TRIES || plan.tubes.is_empty() || over <= 1.0 + WOOD_TOLERANCE {
                 return Ok(Fitted {
+                    request,
                     plan,
                     wood,
                     foliage,
@@ -102,8 +104,8 @@ impl Baker<'_> {
         }
     }
 
-    /// What the level should cover where the tree is `height_px` high, and from afar.
-    fn goal(&self, height_px: f32) -> AreaGoal {
+    /// What the level should cover where it starts, and from afar.
+    fn goal(&self, request: LevelRequest) -> AreaGoal {
         let areas = self.original.areas();
         let seen = |pixels: f32, every: usize| -> (Vec<Camera>, f64) {
             let unit = pixels / self.original.height;
@@ -112,9 +114,9 @@ impl Baker<'_> {
             let cameras = directions.map(|d| camera(d, unit)).collect();
             (cameras, area * f64::from(unit * unit))
         };
-        let (near, near_area) = seen(NEAR_HEIGHT_PX, MATCHED);
-        let (own, own_area) = seen(height_px, 2 * MATCHED);
-        let (far, far_area) = seen(height_px / 2.0, MATCHED);
+        let (near, near_area) = seen(near_height_px(request), MATCHED);
+        let (own, own_area) = seen(request.height_px, 2 * MATCHED);
+        let (far, far_area) = seen(request.height_px / 2.0, MATCHED);
         AreaGoal {
             near,
             near_area,
@@ -147,7 +149,7 @@ impl Baker<'_> {
 impl Fitted {
     /// The least covered area of all training views, over the original's.
     pub(super) fn least_view(&self, original: &Original) -> f64 {
-        let unit = NEAR_HEIGHT_PX / original.height;
+        let unit = near_height_px(self.request) / original.height;
         let mut level = LevelScene::new(&self.foliage, &self.wood.surfaces);
         let cameras: Vec<Camera> = original
             .directions
@@ -170,12 +172,13 @@ impl Fitted {
         let mut scene = self.wood;
         let mut surface = self.foliage.surface();
         surface.material = scene.materials.len() as u32;
-        let material = self.foliage.material(scene.images.len() as u32);
+        let material = foliage::material(scene.images.len() as u32);
         scene.materials.push(material);
         scene.images.extend(self.foliage.images());
         scene.surfaces.push(surface);
         Level {
             scene,
+            request: self.request,
             plan: self.plan,
             matched: self.matched,
             charts: self.foliage.charts,

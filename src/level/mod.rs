@@ -20,6 +20,7 @@ use crate::export::chart::Chart;
 use crate::export::matching::Matched;
 use crate::export::original::Original;
 use crate::export::surface::{Scene, scene_of_model};
+use crate::ladder::{Rung, WHOLE_TREE_TRIANGLES};
 use crate::recipe::{Billboard, Method, Recipe};
 use crate::watch::{Watch, part};
 
@@ -48,15 +49,50 @@ pub struct LevelRequest {
     pub triangles: u64,
     /// Height of the tree in pixels where the level starts.
     pub height_px: f32,
-    /// Height in pixels where it ends and the next one starts.
-    pub end_px: f32,
+    /// Height of the tree in texels of its cards.
+    pub height_texels: f32,
+    /// It starts no nearer than where its error (root mean square) is so many pixels.
+    pub most_error_px: Option<f64>,
+}
+
+impl LevelRequest {
+    /// What a rung asks for.
+    pub fn of(rung: &Rung, method: Method) -> Self {
+        let height_px = rung.height_px as f32;
+        // Levels are looked at from nearer than they are made for: never fewer texels than this.
+        let whole = rung.triangles <= WHOLE_TREE_TRIANGLES && method != Method::CrossedQuads;
+        let least = if whole { 64.0 } else { 256.0 };
+        Self {
+            triangles: rung.triangles,
+            height_px,
+            height_texels: height_px.max(least),
+            most_error_px: None,
+        }
+    }
+
+    /// The request for where a level of so large an error may start; `height` and `error` are in one
+    /// unit. It has at most two texels a pixel there: nobody sees it from nearer.
+    fn no_nearer_than(self, error: f64, height: f32) -> Self {
+        let Some(most) = self.most_error_px else {
+            return self;
+        };
+        let farthest = (most * f64::from(height) / error.max(1e-30)) as f32;
+        let height_px = self.height_px.min(farthest.max(LEAST_HEIGHT_PX));
+        Self {
+            height_px,
+            height_texels: self.height_texels.min(2.0 * height_px),
+            ..self
+        }
+    }
 }
 
 /// A level, not yet written.
 #[derive(Clone, Debug)]
 pub struct Level {
-    /// What to draw.
+    /// What to draw: wood, then the cards, whose three images come last.
     pub scene: Scene,
+    /// What it was made for.
+    pub request: LevelRequest,
     /// Cards and wood of the cut.
     pub plan: LevelPlan,
     /// Threshold and floor of the alpha, and what they gave.
@@ -67,8 +103,8 @@ pub struct Level {
     pub atlas: [u32; 2],
 }
 
-/// Levels of at most so many triangles are whole-tree billboards.
-const WHOLE_TREE_TRIANGLES: u64 = 24;
+/// Where a tree is this high, in pixels, no error of it is seen any more.
+const LEAST_HEIGHT_PX: f32 = 16.0;
 
 /// A view that shows less of its area than this vanishes: level cards are added for it.
 const LEAST_VIEW: f64 = 0.92;
@@ -92,7 +128,7 @@ impl Baker<'_> {
             return Ok(self.fit(plan, request, watch)?.level());
         }
         if request.triangles >= self.tree.model.triangles.len() as u64 {
-            return Ok(self.original_itself());
+            return Ok(self.original_itself(request));
         }
         let Some(plan) = self.cut(request) else {
             let plan = whole_tree(
@@ -121,10 +157,11 @@ impl Baker<'_> {
     }
 
     /// The level of a tree that fits into its budget as it is: nothing is nearer.
-    fn original_itself(&self) -> Level {
+    fn original_itself(&self, request: LevelRequest) -> Level {
         let model = &self.tree.model;
         Level {
             scene: scene_of_model(model, 0..model.triangles.len() as u32),
+            request,
             plan: LevelPlan::default(),
             matched: Matched::default(),
             charts: Vec::new(),
@@ -199,9 +236,18 @@ impl Baker<'_> {
         Some(plan)
     }
 
+    /// Root of the area-weighted mean squared distance between what a plan draws and the original,
+    /// normalised units.
+    pub fn rms_error(&self, plan: &LevelPlan) -> f64 {
+        (plan.error / self.area().max(1e-30)).sqrt()
+    }
+
+    fn area(&self) -> f64 {
+        self.elements.iter().map(|e| f64::from(e.area)).sum()
+    }
+
     /// Fewest triangles whose error is at most `pixels` where the tree is `height_px` high.
     pub fn triangles_within(&self, pixels: f64, height_px: f64) -> u64 {
-        let area: f64 = self.elements.iter().map(|e| f64::from(e.area)).sum();
         let length = pixels / height_px * f64::from(self.original.height);
         let choices = self.choices();
         let pruning = Pruning {
@@ -210,7 +256,7 @@ impl Baker<'_> {
             card_triangles: if self.recipe.triangular_cards { 1 } else { 2 },
             choices: &choices,
         };
-        pruning.cut_within(area * length * length).triangles
+        pruning.cut_within(self.area() * length * length).triangles
     }
 
     fn choices(&self) -> Vec<Vec<Choice>> {

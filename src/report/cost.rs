@@ -66,7 +66,7 @@ mod tests {
         let image = Image {
             width: 2,
             height: 2,
-            rgba: vec![0; 16],
+            rgba: vec![0; 16].into(),
             ..Image::default()
         };
         let base_color = Some(TextureRef {

@@ -18,6 +18,9 @@ pub struct Report {
     /// Level 0 as prototypes and copies; absent where that was not asked for or no leaf repeats.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub instancing: Option<Instancing>,
+    /// The hierarchy of sub-trees; absent where it was not asked for.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub hierarchy: Option<Hierarchy>,
     /// What the bake itself took: in the output of `bake --json` alone. It is absent from
     /// `report.json`, because a package is the same byte for byte on every run.
     #[serde(skip_serializing_if = "Option::is_none", default)]
@@ -248,6 +251,23 @@ pub struct Instancing {
     pub file_bytes: u64,
     /// Bytes of level 0 with every leaf written out.
     pub plain_file_bytes: u64,
+}
+
+/// The hierarchy of sub-trees as files.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Hierarchy {
+    /// The GLB with all tiles, without its folder.
+    pub file: String,
+    /// The tileset (3D Tiles 1.1).
+    pub tileset: String,
+    /// Sub-trees that a cut may use, and what lies between them.
+    pub tiles: u64,
+    /// Tiles that are geometry when opened.
+    pub tips: u64,
+    /// Triangles of all billboards together, wood in them included.
+    pub billboard_triangles: u64,
+    /// Width and height of the page that billboards share, texels.
+    pub atlas: [u32; 2],
 }
 
 /// What a bake took.

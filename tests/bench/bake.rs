@@ -10,7 +10,7 @@ use std::time::Instant;
 
 use pleach::botany::grow::{Options, Species, grow};
 use pleach::botany::load::load;
-use pleach::export::gltf::encode_images;
+use pleach::export::png::encode_images;
 use pleach::export::surface::scene_of_model;
 use pleach::pipeline::{Baked, Limit, Request, Wanted, bake};
 use pleach::report::Drawable;

@@ -5,7 +5,7 @@ import { extname, join, normalize } from 'node:path';
 import { chromium } from 'playwright-core';
 
 const HERE = import.meta.dirname ?? new URL('.', import.meta.url).pathname;
-const TYPES = { '.html': 'text/html', '.js': 'text/javascript', '.mjs': 'text/javascript', '.glb': 'model/gltf-binary' };
+const TYPES = { '.html': 'text/html', '.js': 'text/javascript', '.mjs': 'text/javascript', '.glb': 'model/gltf-binary', '.json': 'application/json', '.png': 'image/png', '.css': 'text/css' };
 
 const FLAGS = [
   '--no-sandbox',
@@ -19,12 +19,13 @@ const FLAGS = [
   '--no-first-run',
 ];
 
-/** Serves this folder at / and `files[i]` at /file/i. */
-function serve(files) {
+/** Serves this folder at /, `files[i]` at /file/i and `folder` at /package. */
+function serve(files, folder) {
   const server = createServer((request, response) => {
     const path = normalize(decodeURIComponent(new URL(request.url, 'http://localhost').pathname));
     const numbered = path.match(/^\/file\/(\d+)$/);
-    const file = numbered ? files[Number(numbered[1])] : join(HERE, path);
+    const packaged = folder && path.match(/^\/package\/([^/]+)$/);
+    const file = numbered ? files[Number(numbered[1])] : packaged ? join(folder, packaged[1]) : join(HERE, path);
     try {
       statSync(file);
     } catch {
@@ -51,9 +52,9 @@ export async function withBrowser(work) {
   }
 }
 
-/** Opens `page` with `files` at hand, waits for `window.ready`, runs `work(page)` and cleans up. Page errors are errors. */
-export async function withPage(html, files, work) {
-  const server = await serve(files);
+/** Opens `page` with `files` (and what is in `folder`) at hand, waits for `window.ready`, runs `work(page)` and cleans up. Page errors are errors. */
+export async function withPage(html, files, work, folder) {
+  const server = await serve(files, folder);
   try {
     return await withBrowser((browser) => onPage(browser, `http://127.0.0.1:${server.address().port}/${html}`, work));
   } finally {

@@ -68,7 +68,7 @@ fn a_material_is_carried_as_the_file_says() {
     assert_eq!(m.emissive, Some(base));
     assert_eq!((model.images[0].width, model.images[0].height), (2, 3));
     // Straight alpha, colour untouched.
-    assert_eq!(model.images[0].rgba, [10, 20, 30, 40].repeat(6));
+    assert_eq!(*model.images[0].rgba, [10, 20, 30, 40].repeat(6));
     assert!(model.warnings.is_empty());
 }
 
@@ -205,7 +205,7 @@ fn jpeg_and_webp_are_read_by_their_bytes() {
     file.json["images"][1] = json!({ "uri": data_uri(&jpeg) });
     file.json["extensionsRequired"] = json!(["EXT_texture_webp"]);
     let model = file.load().unwrap();
-    assert_eq!(model.images[0].rgba, [1, 2, 3, 77].repeat(6));
+    assert_eq!(*model.images[0].rgba, [1, 2, 3, 77].repeat(6));
     let jpeg = &model.images[1].rgba;
     assert_eq!((jpeg.len(), jpeg[3]), (256, 255));
     assert!(
@@ -213,7 +213,7 @@ fn jpeg_and_webp_are_read_by_their_bytes() {
         "{:?}",
         &jpeg[..4]
     );
-    assert_eq!(model.images[2].rgba, [1, 2, 3, 255].repeat(6));
+    assert_eq!(*model.images[2].rgba, [1, 2, 3, 255].repeat(6));
 }
 
 #[test]
@@ -244,7 +244,7 @@ fn textures_that_are_not_read_are_refused_or_left_out() {
     let view = file.view(&image);
     let source = file.add("images", json!({ "bufferView": view }));
     file.json["textures"][0]["source"] = json!(source);
-    assert_eq!(file.load().unwrap().images[0].rgba, [5; 4]);
+    assert_eq!(*file.load().unwrap().images[0].rgba, [5; 4]);
     for (mime, name) in [
         ("image/avif", "AVIF"),
         ("image/ktx2", "KTX2"),
@@ -318,6 +318,6 @@ fn palettes_grey_and_16_bit_images_become_straight_rgba() {
     for (bytes, want) in cases {
         let material = json!({ "pbrMetallicRoughness": { "baseColorTexture": { "index": 0 } } });
         let model = textured(material, &[&bytes]).load().unwrap();
-        assert_eq!(model.images[0].rgba, want);
+        assert_eq!(*model.images[0].rgba, want);
     }
 }

@@ -210,7 +210,7 @@ fn decode(bytes: &[u8], format: Format, pixels: u64) -> std::result::Result<Imag
         name: String::new(),
         width: rgba.width(),
         height: rgba.height(),
-        rgba: rgba.into_raw(),
+        rgba: rgba.into_raw().into(),
     })
 }
 
@@ -235,7 +235,7 @@ fn decode_webp(bytes: &[u8], pixels: u64) -> std::result::Result<Image, String> 
         name: String::new(),
         width,
         height,
-        rgba: texels,
+        rgba: texels.into(),
     })
 }
 

@@ -100,8 +100,10 @@ const PAGE_PX: u32 = 256;
 /// [`Error::Internal`] if it can't be encoded.
 pub fn page(image: &crate::botany::model::Image) -> Result<Option<(Vec<u8>, u32, u32)>> {
     // Pixels may have been left behind to save memory.
-    let Some(whole) = image::RgbaImage::from_raw(image.width, image.height, image.rgba.clone())
-    else {
+    let texels = image.rgba.as_slice();
+    let whole: Option<image::ImageBuffer<image::Rgba<u8>, _>> =
+        image::ImageBuffer::from_raw(image.width, image.height, texels);
+    let Some(whole) = whole else {
         return Ok(None);
     };
     let longest = image.width.max(image.height).max(1);

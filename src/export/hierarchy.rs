@@ -1,0 +1,193 @@
+//! The hierarchy of sub-trees as files: all tiles in one GLB, and each tile in one of its own.
+//!
+//! In the one GLB all billboards share a page, hence a material; scene 0 is the geometry of all
+//! tips, scene 1 holds the billboards of all tiles, each in a node that is named in the manifest. A
+//! viewer shows the tree; an engine takes the nodes that its cut names.
+
+use std::sync::Arc;
+
+use glam::Vec2;
+use serde_json::Value;
+
+use super::blocks;
+use super::foliage;
+use super::gltf::{FileBuilder, write_glb};
+use super::png::encode_images;
+use super::surface::{Scene, scene_of_groups};
+use crate::botany::model::{Frame, Image, Model};
+use crate::error::Result;
+use crate::level::Level;
+
+/// A tile that is ready to be written.
+pub struct TileFiles {
+    /// Name of its node.
+    pub node: String,
+    /// What stands for it from afar.
+    pub billboards: Option<Level>,
+    /// Where its normalised space lies in the world.
+    pub frame: Frame,
+    /// Its triangles, where it is a tip.
+    pub geometry: Option<Vec<u32>>,
+    /// What its nodes say of it.
+    pub extras: Value,
+}
+
+impl TileFiles {
+    /// Name of the node of its triangles.
+    pub fn geometry_node(&self) -> String {
+        self.node.clone() + " geometry"
+    }
+}
+
+/// Where the billboards of each tile lie on a page for all: left, top, width, height in texels; and
+/// the page's size.
+pub fn places(tiles: &[TileFiles]) -> (Vec<[u32; 4]>, [u32; 2]) {
+    let size = |t: &TileFiles| t.billboards.as_ref().map_or([0; 2], |l| l.atlas);
+    let carded: Vec<usize> = (0..tiles.len())
+        .filter(|&i| size(&tiles[i]) != [0; 2])
+        .collect();
+    let sizes: Vec<[u32; 2]> = carded.iter().map(|&i| size(&tiles[i])).collect();
+    let (corners, page) = blocks::place(&sizes);
+    let mut out = vec![[0; 4]; tiles.len()];
+    for ((&i, [x, y]), [w, h]) in carded.iter().zip(corners).zip(sizes) {
+        out[i] = [x, y, w, h];
+    }
+    (out, page)
+}
+
+/// Writes all tiles into one GLB, their billboards on a page of the given size.
+///
+/// # Errors
+/// Those of encoding images.
+pub fn write_hierarchy(
+    model: &Model,
+    tiles: &[TileFiles],
+    places: &[[u32; 4]],
+    page: [u32; 2],
+) -> Result<Vec<u8>> {
+    let mut file = FileBuilder::default();
+    let billboards = add_billboards(&mut file, tiles, places, page)?;
+    let tips: Vec<&TileFiles> = tiles.iter().filter(|t| t.geometry.is_some()).collect();
+    let triangles = tips.iter().filter_map(|t| t.geometry.as_deref());
+    let (scene, ranges) = scene_of_groups(model, triangles);
+    let numbers = file.materials(&scene, &encode_images(&scene)?);
+    let mut geometry = Vec::with_capacity(tips.len());
+    for (tile, range) in tips.iter().zip(ranges) {
+        let (name, surfaces) = (tile.geometry_node(), &scene.surfaces[range]);
+        let mesh = file.mesh_of(&name, surfaces, &scene.materials, &numbers)?;
+        geometry.push(file.node(&name, mesh, &model.frame, tile.extras.clone()));
+    }
+    let mut scenes = vec![("geometry", geometry)];
+    if !billboards.is_empty() {
+        scenes.push(("billboards", billboards));
+    }
+    Ok(file.finish_scenes(&scenes))
+}
+
+/// Adds a node for the billboards of each tile that has some.
+fn add_billboards(
+    file: &mut FileBuilder,
+    tiles: &[TileFiles],
+    places: &[[u32; 4]],
+    page: [u32; 2],
+) -> Result<Vec<usize>> {
+    let mut texels = [0; 3].map(|_| vec![0; page[0] as usize * page[1] as usize * 4]);
+    let mut nodes = Vec::new();
+    let mut scenes = Vec::new();
+    for (tile, &[x, y, w, h]) in tiles.iter().zip(places) {
+        let Some(level) = &tile.billboards else {
+            continue;
+        };
+        let mut scene = level.scene.clone();
+        if w > 0 {
+            // Cards come last, and so do their images.
+            let cards = scene.images.split_off(scene.images.len() - 3);
+            for (page_texels, image) in texels.iter_mut().zip(cards) {
+                blocks::copy(page_texels, page[0], &image.rgba, [w, h], [x, y]);
+            }
+            scene.materials.pop();
+            if let Some(surface) = scene.surfaces.last_mut() {
+                let (at, size) = (Vec2::new(x as f32, y as f32), Vec2::new(w as f32, h as f32));
+                let all = Vec2::new(page[0] as f32, page[1] as f32);
+                for uv in &mut surface.uvs[0] {
+                    *uv = (*uv * size + at) / all;
+                }
+            }
+        }
+        scenes.push((tile, scene, w > 0));
+    }
+    let page_scene = Scene {
+        materials: vec![foliage::material(0)],
+        images: foliage::IMAGES
+            .iter()
+            .zip(texels)
+            .map(|(name, rgba)| Image {
+                name: (*name).into(),
+                width: page[0],
+                height: page[1],
+                rgba: Arc::new(rgba),
+            })
+            .collect(),
+        ..Scene::default()
+    };
+    let with_cards = scenes.iter().any(|s| s.2);
+    let shared = match with_cards {
+        true => file.materials(&page_scene, &encode_images(&page_scene)?),
+        false => Vec::new(),
+    };
+    for (tile, mut scene, carded) in scenes {
+        let mut numbers = file.materials(&scene, &encode_images(&scene)?);
+        if carded {
+            numbers.extend(&shared);
+            scene.materials.extend(page_scene.materials.iter().cloned());
+        }
+        let mesh = file.mesh_of(&tile.node, &scene.surfaces, &scene.materials, &numbers)?;
+        nodes.push(file.node(&tile.node, mesh, &tile.frame, tile.extras.clone()));
+    }
+    Ok(nodes)
+}
+
+/// The billboards of one tile as a GLB of its own; `None` where it has none.
+///
+/// # Errors
+/// Those of encoding images.
+pub fn write_billboards(tile: &TileFiles) -> Result<Option<Vec<u8>>> {
+    let Some(level) = &tile.billboards else {
+        return Ok(None);
+    };
+    let pngs = encode_images(&level.scene)?;
+    let extras = tile.extras.clone();
+    write_glb(&tile.node, &level.scene, &pngs, &tile.frame, extras).map(Some)
+}
+
+/// Name and bytes of a file.
+pub type Named = (String, Vec<u8>);
+
+/// The triangles of the tips as GLBs of their own, in order, and the images (PNG) that they share;
+/// `prefix` begins their names.
+///
+/// # Errors
+/// Those of encoding images.
+pub fn write_geometry(
+    model: &Model,
+    tiles: &[TileFiles],
+    prefix: &str,
+) -> Result<(Vec<Named>, Vec<Vec<u8>>)> {
+    let tips: Vec<&TileFiles> = tiles.iter().filter(|t| t.geometry.is_some()).collect();
+    let triangles = tips.iter().filter_map(|t| t.geometry.as_deref());
+    let (scene, ranges) = scene_of_groups(model, triangles);
+    let pngs = encode_images(&scene)?;
+    let named = |(i, png)| (format!("{prefix}_image_{i}.png"), png);
+    let images: Vec<Named> = pngs.into_iter().enumerate().map(named).collect();
+    let mut out = Vec::with_capacity(tips.len());
+    for (tile, range) in tips.iter().zip(ranges) {
+        let (name, surfaces) = (tile.geometry_node(), &scene.surfaces[range]);
+        let mut file = FileBuilder::default();
+        let uris: Vec<&str> = images.iter().map(|(name, _)| name.as_str()).collect();
+        let numbers = file.linked_materials(&scene, surfaces, &uris);
+        let mesh = file.mesh_of(&name, surfaces, &scene.materials, &numbers)?;
+        let node = file.node(&name, mesh, &model.frame, tile.extras.clone());
+        out.push(file.finish(vec![node]));
+    }
+    Ok((images, out))
+}
