@@ -183,3 +183,30 @@ fn slivers_are_baked_and_a_budget_beyond_the_tree_is_the_tree() {
     assert_eq!(triangles[..2], [112 + 100; 2]);
     assert!((report.levels[0].sizes[0].area_ratio.worst - 1.0).abs() < 0.01);
 }
+
+#[test]
+fn leaves_in_one_point_are_one_and_a_tree_that_is_there_twice_is_one_tree() {
+    let point = |_| Vec3::Y;
+    let report = bake(
+        &[("leaf", leaves(300, 1.0, point, true))],
+        &["--triangles", "24"],
+    );
+    assert_eq!(report.original.unwrap().triangles, 2);
+    let tree = || vec![("bark", trunk()), ("leaf", leaves(100, 0.3, ball, false))];
+    let (once, mut twice) = (tree(), tree());
+    for (part, (_, again)) in twice.iter_mut().zip(tree()) {
+        let base = part.1.0.len() as u32;
+        part.1.0.extend(again.0);
+        part.1.1.extend(again.1.iter().map(|t| t.map(|i| i + base)));
+    }
+    let [once, twice] = [once, twice].map(|parts| bake(&parts, &["--triangles", "20%,24"]));
+    let triangles = |r: &Report| r.original.as_ref().unwrap().triangles;
+    assert_eq!(triangles(&twice), triangles(&once));
+    let figures = |r: &Report| {
+        r.levels
+            .iter()
+            .map(|l| l.sizes[0].f1.mean)
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(figures(&twice), figures(&once));
+}

@@ -64,7 +64,7 @@ fn everything() -> File {
         "pbrMetallicRoughness": { "baseColorTexture": { "index": 0, "extensions": { "KHR_texture_transform": { "scale": [2, 2], "rotation": 1 } } } },
         "normalTexture": { "index": 1 }, "occlusionTexture": { "index": 2 },
     }));
-    let t = file.floats("VEC3", &[0.0, 1.0, 2.0].repeat(2));
+    let t = file.floats("VEC3", &[0.0, 1.0, 2.0, 1.0, 1.0, 2.0]);
     file.node(json!({ "mesh": 0, "scale": [-1, 1, 1], "extensions": { "EXT_mesh_gpu_instancing": { "attributes": { "TRANSLATION": t } } } }));
     // A compressed strip, skinned.
     let packed = encode_vertex_buffer(&[

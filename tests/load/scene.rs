@@ -60,7 +60,7 @@ fn normals_stay_perpendicular_under_uneven_scale() {
 #[test]
 fn shared_meshes_and_instances_are_expanded_and_tell_their_objects() {
     let mut file = File::triangle();
-    let t = file.floats("VEC3", &[0.0, 0.0, 0.0, 0.0, 0.0, 4.0]);
+    let t = file.floats("VEC3", &[0.0, 0.0, 1.0, 0.0, 0.0, 4.0]);
     let s = file.floats("VEC3", &[1.0, 1.0, 1.0, 0.5, 0.5, 0.5]);
     // Half a turn about x, as normalised bytes.
     let r = file.accessor(&[0, 0, 0, 127, 127, 0, 0, 0], I8, "VEC4", 2);
@@ -70,7 +70,7 @@ fn shared_meshes_and_instances_are_expanded_and_tell_their_objects() {
     let model = file.load().unwrap();
     let want = [
         [[0.0; 3], [2.0, 0.0, 0.0], [0.0, 2.0, 0.0]],
-        [[0.0; 3], [2.0, 0.0, 0.0], [0.0, 2.0, 0.0]],
+        [[0.0, 0.0, 1.0], [2.0, 0.0, 1.0], [0.0, 2.0, 1.0]],
         [[0.0, 0.0, 4.0], [1.0, 0.0, 4.0], [0.0, -1.0, 4.0]],
         [[0.0, 0.0, -1.0], [2.0, 0.0, -1.0], [0.0, 2.0, -1.0]],
     ];
@@ -78,6 +78,19 @@ fn shared_meshes_and_instances_are_expanded_and_tell_their_objects() {
     assert_eq!(model.triangle_object, [0, 1, 2, 3]);
     let names: Vec<&str> = model.objects.iter().map(|o| o.name.as_str()).collect();
     assert_eq!(names, ["", "i", "i", ""]);
+}
+
+#[test]
+fn a_mesh_that_is_in_the_scene_twice_at_one_place_is_there_once() {
+    let mut file = File::triangle();
+    let once = file.load().unwrap();
+    file.node(json!({ "mesh": 0 }));
+    let twice = file.load().unwrap();
+    assert_eq!(world(&twice), world(&once));
+    let [warning] = twice.warnings.as_slice() else {
+        panic!("{:?}", twice.warnings);
+    };
+    assert!(warning.contains("lies exactly on another"), "{warning}");
 }
 
 /// A small tree-like heap of triangles in one mesh under two nodes.

@@ -16,6 +16,7 @@
 mod accessor;
 mod buffer;
 mod container;
+mod copies;
 mod image;
 mod json;
 mod material;
@@ -128,6 +129,8 @@ pub fn load_slice(bytes: &[u8], path: &Path, limits: &Limits) -> Result<Model> {
     let mut file_bytes = asset.file_bytes;
     model.images = image::decode_all(&asset, &materials.images, &mut file_bytes)?;
     model.materials = std::mem::take(&mut materials.list);
+    let copies = copies::drop_copies(&mut model);
+    warnings.count("a triangle lies exactly on another: dropped", copies, "");
     model.file_bytes = file_bytes;
     model.name = path
         .file_stem()
