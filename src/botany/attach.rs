@@ -4,7 +4,7 @@
 //! corners or edge middles lies nearest to wood over a sample of its leaves; then one look-up a
 //! leaf is enough, and a tip that happens to touch another twig deceives nobody.
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
 use super::skeleton::near::{Contact, Grid, Segment};
@@ -129,11 +129,28 @@ struct BasePoint {
     inward: f32,
 }
 
-/// The corners of a leaf in the order of the file's vertices, which mirroring doesn't change
-/// (the order of a triangle's corners it does).
+/// The corners of a leaf in the order of their places on the texture, which neither mirroring nor
+/// another order of the file's vertices changes; where these are the same, in the file's order.
 struct Outline {
     corners: Vec<Vec3>,
     center: Vec3,
+}
+
+/// Steps of the texture that a leaf covers within which two corners have one place.
+const STEPS: f32 = 1024.0;
+
+fn sort_by_texture(vertices: &mut [u32], uvs: &[Vec2]) {
+    let uv = |v: &u32| uvs[*v as usize];
+    let (low, high) = vertices
+        .iter()
+        .map(uv)
+        .fold((Vec2::MAX, Vec2::MIN), |(a, b), p| (a.min(p), b.max(p)));
+    let step = (high - low).max(Vec2::splat(1e-12)) / STEPS;
+    vertices.sort_by_key(|v| {
+        let at = ((uv(v) - low) / step).round();
+        // From the lower edge of the texture, where stalks are painted: of equals the first is taken.
+        (-at.y as i32, at.x as i32)
+    });
 }
 
 impl Outline {
@@ -143,6 +160,7 @@ impl Outline {
             .collect();
         vertices.sort_unstable();
         vertices.dedup();
+        sort_by_texture(&mut vertices, &tree.model.uvs[0]);
         let stride = vertices.len().div_ceil(MOST_POINTS).max(1);
         Self {
             corners: (vertices.iter().step_by(stride))
