@@ -251,3 +251,13 @@ fn changed_json_values_never_panic() {
         }
     }
 }
+
+/// Writes the file that uses every feature as a seed for the fuzzer.
+#[test]
+#[ignore = "writes tests/fuzz/seeds"]
+fn write_a_seed() {
+    let seeds = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fuzz/seeds");
+    std::fs::write(seeds.join("everything.glb"), everything().glb()).unwrap();
+    let file = File::triangle();
+    std::fs::write(seeds.join("triangle.glb"), file.glb()).unwrap();
+}
