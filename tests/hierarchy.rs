@@ -51,9 +51,9 @@ fn request(input: &Path, output: &Path) -> Request {
 }
 
 /// The package of a small oak, baked once for all tests.
-fn oak() -> &'static (PathBuf, Baked) {
-    static OAK: OnceLock<(PathBuf, Baked)> = OnceLock::new();
-    OAK.get_or_init(|| {
+fn small() -> &'static (PathBuf, Baked) {
+    static BAKED: OnceLock<(PathBuf, Baked)> = OnceLock::new();
+    BAKED.get_or_init(|| {
         let home = Path::new(env!("CARGO_TARGET_TMPDIR")).join("hierarchy");
         std::fs::create_dir_all(&home).unwrap();
         let (input, out) = (grow(&home, "oak", 500), home.join("out"));
@@ -102,7 +102,7 @@ fn triangles(bytes: &[u8]) -> (BTreeMap<String, usize>, BTreeMap<String, usize>)
 
 #[test]
 fn the_files_hold_every_tile_and_the_tips_are_the_tree() {
-    let (out, baked) = oak();
+    let (out, baked) = small();
     let (manifest, tiles) = manifest(out, "oak");
     let on_disk = files(out);
     assert!(
@@ -186,7 +186,7 @@ fn tileset_names_all(on_disk: &BTreeMap<String, Vec<u8>>, tiles: &Tiles) {
 
 #[test]
 fn every_cut_of_the_tiles_covers_every_leaf_once() {
-    let (out, _) = oak();
+    let (out, _) = small();
     let (manifest, tiles) = manifest(out, "oak");
     let hierarchy = tiles.hierarchy(&manifest).unwrap();
     assert_eq!(hierarchy.nodes().len(), tiles.list.len());
@@ -224,7 +224,7 @@ fn every_cut_of_the_tiles_covers_every_leaf_once() {
 
 #[test]
 fn billboards_of_tips_look_like_their_geometry() {
-    let (out, _) = oak();
+    let (out, _) = small();
     let (_, tiles) = manifest(out, "oak");
     let (mut f1, mut count) = (0.0, 0.0);
     for tile in &tiles.list {
@@ -271,6 +271,9 @@ fn tiles_that_the_scene_never_opens_are_not_baked() {
     let (_, one) = manifest(&out, "palm");
     assert!(all.list.len() > 1);
     assert_eq!((one.list.len(), &one.list[0].geometry), (1, &None));
+    // A glTF scene without nodes would be invalid.
+    let (_, scenes) = triangles(&files(&out)[&one.file]);
+    assert!(scenes.keys().eq(["billboards"]), "{scenes:?}");
     assert!(
         !files(&out)
             .keys()

@@ -1,8 +1,9 @@
 //! The hierarchy of sub-trees as files: all tiles in one GLB, and each tile in one of its own.
 //!
-//! In the one GLB all billboards share a page, hence a material; scene 0 is the geometry of all
-//! tips, scene 1 holds the billboards of all tiles, each in a node that is named in the manifest. A
-//! viewer shows the tree; an engine takes the nodes that its cut names.
+//! In the one GLB all billboards share a page, hence a material; the first scene is the geometry of
+//! all tips (there is none where nothing is ever opened), the second holds the billboards of all
+//! tiles, each in a node that is named in the manifest. A viewer shows the tree; an engine takes the
+//! nodes that its cut names.
 
 use std::sync::Arc;
 
@@ -77,10 +78,9 @@ pub fn write_hierarchy(
         let mesh = file.mesh_of(&name, surfaces, &scene.materials, &numbers)?;
         geometry.push(file.node(&name, mesh, &model.frame, tile.extras.clone()));
     }
-    let mut scenes = vec![("geometry", geometry)];
-    if !billboards.is_empty() {
-        scenes.push(("billboards", billboards));
-    }
+    // Where nothing is ever opened there is no geometry, and a scene without nodes is none.
+    let mut scenes = vec![("geometry", geometry), ("billboards", billboards)];
+    scenes.retain(|(_, nodes)| !nodes.is_empty());
     Ok(file.finish_scenes(&scenes))
 }
 
