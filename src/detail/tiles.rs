@@ -3,8 +3,8 @@
 //! A sub-tree with too few triangles to be worth a draw call of its own stays with what its carrier
 //! bears itself: "loose" pieces. Many of those are halved in space until each is small, so that a
 //! trunk with a thousand twigs has tiles, too. Where a sub-tree carries many large ones, neighbours
-//! are grouped: between a tree and its thirty branches there are cuts. Children cover their parent: every leaf is under
-//! exactly one child, and the tips together are the tree.
+//! are grouped: between a tree and its thirty branches there are cuts. Children cover their parent:
+//! every leaf is under exactly one child, and the tips together are the tree.
 
 use glam::Vec3;
 
@@ -225,29 +225,32 @@ impl<'t> Builder<'t> {
     }
 
     /// What a sub-tree is made of: the large ones that it carries, and the rest.
-    fn open(&self, mut subtree: u32) -> Vec<Part> {
+    ///
+    /// Where it carries one large one and little else, that one's parts take its place: every step
+    /// then splits off a share of the tree, and a chain of a thousand orders is no thousand tiles.
+    fn open(&self, subtree: u32) -> Vec<Part> {
+        let (mut at, mut rest) = (subtree, Vec::new());
         loop {
-            let carried = &self.tree.subtrees[subtree as usize].children;
+            let carried = &self.tree.subtrees[at as usize].children;
             let (large, small): (Vec<u32>, Vec<u32>) = carried
                 .iter()
                 .partition(|&&c| self.count[c as usize] >= self.size.least);
-            let mut rest = self.own[subtree as usize].clone();
+            rest.extend(&self.own[at as usize]);
             rest.extend(small.iter().flat_map(|&s| self.under(s)));
-            match (large.as_slice(), rest.is_empty()) {
-                // The tree is its trunk: no step between the two.
-                (&[only], true) => subtree = only,
-                ([], _) => return self.split(subtree, rest),
-                (_, empty) => {
+            let loose = |u: &u32| self.units[*u as usize].triangles.len();
+            match large.as_slice() {
+                [] => return self.split(subtree, rest),
+                &[only] if rest.iter().map(loose).sum::<usize>() < self.size.least => at = only,
+                _ => {
                     let all = |subtree| Part {
                         subtree,
                         of: Of::All,
                     };
-                    let rest = Part {
+                    let rest = (!rest.is_empty()).then_some(Part {
                         subtree,
                         of: Of::Units(rest),
-                    };
-                    let large = large.into_iter().map(all);
-                    return large.chain((!empty).then_some(rest)).collect();
+                    });
+                    return large.into_iter().map(all).chain(rest).collect();
                 }
             }
         }
@@ -391,5 +394,40 @@ mod tests {
                 .filter(|t| t.whole)
                 .all(|t| t.triangles.len() >= 100)
         );
+    }
+
+    #[test]
+    fn a_chain_of_a_thousand_orders_is_few_tiles() {
+        let orders = 1000u32;
+        let mut tree = Tree::default();
+        for i in 0..orders {
+            let at = Vec3::Y * i as f32;
+            let first = tree.model.positions.len() as u32;
+            tree.model
+                .positions
+                .extend([at, at + Vec3::X, at + Vec3::Z]);
+            tree.model.triangles.push([first, first + 1, first + 2]);
+            tree.organ.push(Organ::Foliage);
+            tree.wood_node.push(NO_NODE);
+            tree.leaves.push(crate::botany::tree::Leaf {
+                triangles: vec![i],
+                ..Default::default()
+            });
+            tree.subtrees.push(crate::botany::tree::Subtree {
+                parent: i.checked_sub(1),
+                children: (i + 1 < orders).then_some(i + 1).into_iter().collect(),
+                leaves: vec![i],
+                ..Default::default()
+            });
+        }
+        let tiles = tiles(
+            &tree,
+            TileSize {
+                least: 50,
+                most: 200,
+            },
+        );
+        check(&tree, &tiles);
+        assert!((10..60).contains(&tiles.len()), "{}", tiles.len());
     }
 }

@@ -77,7 +77,7 @@ impl FileBuilder {
         &mut self,
         scene: &Scene,
         surfaces: &[Surface],
-        uris: &[&str],
+        uris: &[String],
     ) -> Vec<usize> {
         let mut numbers = vec![0; scene.materials.len()];
         let mut images = vec![0; scene.images.len()];
@@ -85,7 +85,7 @@ impl FileBuilder {
             let mut material = scene.materials[surface.material as usize].clone();
             for texture in textures_of(&mut material).into_iter().flatten() {
                 let image = texture.image as usize;
-                images[image] = self.linked_image(&scene.images[image].name, uris[image]);
+                images[image] = self.linked_image(&scene.images[image].name, &uris[image]);
             }
             let value = self.material(&material, &images);
             numbers[surface.material as usize] = find_or_push(&mut self.materials, value);

@@ -5,6 +5,7 @@
 //! tiles, each in a node that is named in the manifest. A viewer shows the tree; an engine takes the
 //! nodes that its cut names.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use glam::Vec2;
@@ -14,7 +15,7 @@ use super::blocks;
 use super::foliage;
 use super::gltf::{FileBuilder, write_glb};
 use super::png::encode_images;
-use super::surface::{Scene, scene_of_groups};
+use super::surface::{Scene, Surface, scene_of_groups};
 use crate::botany::model::{Frame, Image, Model};
 use crate::error::Result;
 use crate::level::Level;
@@ -37,6 +38,40 @@ impl TileFiles {
     /// Name of the node of its triangles.
     pub fn geometry_node(&self) -> String {
         self.node.clone() + " geometry"
+    }
+}
+
+/// The triangles of all tips, with their images encoded once for all files.
+pub struct Tips<'t> {
+    tiles: Vec<&'t TileFiles>,
+    scene: Scene,
+    /// Surfaces of each tip.
+    ranges: Vec<Range<usize>>,
+    /// The scene's images as PNG.
+    pub pngs: Vec<Vec<u8>>,
+}
+
+impl<'t> Tips<'t> {
+    /// Of those tiles that have geometry.
+    ///
+    /// # Errors
+    /// Those of encoding images.
+    pub fn new(model: &Model, tiles: &'t [TileFiles]) -> Result<Self> {
+        let triangles = tiles.iter().filter_map(|t| t.geometry.as_deref());
+        let (scene, ranges) = scene_of_groups(model, triangles);
+        Ok(Self {
+            tiles: tiles.iter().filter(|t| t.geometry.is_some()).collect(),
+            pngs: encode_images(&scene)?,
+            scene,
+            ranges,
+        })
+    }
+
+    /// Each tip with its surfaces.
+    fn each(&self) -> impl Iterator<Item = (&'t TileFiles, &[Surface])> {
+        let ranges = self.ranges.iter().cloned();
+        let surfaces = ranges.map(|range| &self.scene.surfaces[range]);
+        self.tiles.iter().copied().zip(surfaces)
     }
 }
 
@@ -63,19 +98,17 @@ pub fn places(tiles: &[TileFiles]) -> (Vec<[u32; 4]>, [u32; 2]) {
 pub fn write_hierarchy(
     model: &Model,
     tiles: &[TileFiles],
+    tips: &Tips,
     places: &[[u32; 4]],
     page: [u32; 2],
 ) -> Result<Vec<u8>> {
     let mut file = FileBuilder::default();
     let billboards = add_billboards(&mut file, tiles, places, page)?;
-    let tips: Vec<&TileFiles> = tiles.iter().filter(|t| t.geometry.is_some()).collect();
-    let triangles = tips.iter().filter_map(|t| t.geometry.as_deref());
-    let (scene, ranges) = scene_of_groups(model, triangles);
-    let numbers = file.materials(&scene, &encode_images(&scene)?);
-    let mut geometry = Vec::with_capacity(tips.len());
-    for (tile, range) in tips.iter().zip(ranges) {
-        let (name, surfaces) = (tile.geometry_node(), &scene.surfaces[range]);
-        let mesh = file.mesh_of(&name, surfaces, &scene.materials, &numbers)?;
+    let numbers = file.materials(&tips.scene, &tips.pngs);
+    let mut geometry = Vec::with_capacity(tips.tiles.len());
+    for (tile, surfaces) in tips.each() {
+        let name = tile.geometry_node();
+        let mesh = file.mesh_of(&name, surfaces, &tips.scene.materials, &numbers)?;
         geometry.push(file.node(&name, mesh, &model.frame, tile.extras.clone()));
     }
     // Where nothing is ever opened there is no geometry, and a scene without nodes is none.
@@ -160,34 +193,19 @@ pub fn write_billboards(tile: &TileFiles) -> Result<Option<Vec<u8>>> {
     write_glb(&tile.node, &level.scene, &pngs, &tile.frame, extras).map(Some)
 }
 
-/// Name and bytes of a file.
-pub type Named = (String, Vec<u8>);
-
-/// The triangles of the tips as GLBs of their own, in order, and the images (PNG) that they share;
-/// `prefix` begins their names.
+/// The triangles of the tips as GLBs of their own, in order; their images are files of these names.
 ///
 /// # Errors
-/// Those of encoding images.
-pub fn write_geometry(
-    model: &Model,
-    tiles: &[TileFiles],
-    prefix: &str,
-) -> Result<(Vec<Named>, Vec<Vec<u8>>)> {
-    let tips: Vec<&TileFiles> = tiles.iter().filter(|t| t.geometry.is_some()).collect();
-    let triangles = tips.iter().filter_map(|t| t.geometry.as_deref());
-    let (scene, ranges) = scene_of_groups(model, triangles);
-    let pngs = encode_images(&scene)?;
-    let named = |(i, png)| (format!("{prefix}_image_{i}.png"), png);
-    let images: Vec<Named> = pngs.into_iter().enumerate().map(named).collect();
-    let mut out = Vec::with_capacity(tips.len());
-    for (tile, range) in tips.iter().zip(ranges) {
-        let (name, surfaces) = (tile.geometry_node(), &scene.surfaces[range]);
+/// Those of writing meshes.
+pub fn write_geometry(model: &Model, tips: &Tips, images: &[String]) -> Result<Vec<Vec<u8>>> {
+    let scene = &tips.scene;
+    let written = tips.each().map(|(tile, surfaces)| {
+        let name = tile.geometry_node();
         let mut file = FileBuilder::default();
-        let uris: Vec<&str> = images.iter().map(|(name, _)| name.as_str()).collect();
-        let numbers = file.linked_materials(&scene, surfaces, &uris);
+        let numbers = file.linked_materials(scene, surfaces, images);
         let mesh = file.mesh_of(&name, surfaces, &scene.materials, &numbers)?;
         let node = file.node(&name, mesh, &model.frame, tile.extras.clone());
-        out.push(file.finish(vec![node]));
-    }
-    Ok((images, out))
+        Ok(file.finish(vec![node]))
+    });
+    written.collect()
 }

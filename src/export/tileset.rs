@@ -1,8 +1,8 @@
 //! The hierarchy as 3D Tiles 1.1 (OGC 22-025r4): engines that read it refine by themselves.
 //!
 //! A client refines a tile where its geometric error, projected on the screen, exceeds a number of
-//! pixels; the loaders' defaults are [`CLIENT_PX`]. Here a tile takes over where one of its texels is
-//! a pixel, so errors are stated that many times as large. The error of the whole tileset says from
+//! pixels; the loaders' defaults are [`CLIENT_PX`]. A tile is to take over at its switch distance, so
+//! its error is stated as what is that many pixels there. The error of the whole tileset says from
 //! where nothing is drawn at all.
 
 use serde_json::{Value, json};
@@ -18,15 +18,15 @@ const NEVER: f64 = 1e12;
 /// The tileset of tiles for a camera of so many pixels of focal length; nothing is drawn from
 /// `vanish_m` on.
 pub fn tileset(tiles: &[Tile], focal_px: f64, vanish_m: f64) -> Value {
-    let errors = errors(tiles, focal_px);
-    let vanish = (CLIENT_PX * vanish_m / focal_px).min(NEVER).max(errors[0]);
+    let vanish = (CLIENT_PX * vanish_m / focal_px).min(NEVER);
+    let vanish = vanish.max(error(&tiles[0], focal_px));
     // Not all clients look at the tileset's own error: a tile without content says it again.
     let mut root = json!({
         "boundingVolume": volume(&tiles[0]),
         "geometricError": vanish,
         "refine": "REPLACE",
     });
-    root["children"] = json!([tile(tiles, &errors, 0)]);
+    root["children"] = json!([tile(tiles, focal_px, 0)]);
     json!({
         "asset": { "version": "1.1", "generator": concat!("pleach ", env!("CARGO_PKG_VERSION")) },
         "geometricError": vanish,
@@ -34,30 +34,19 @@ pub fn tileset(tiles: &[Tile], focal_px: f64, vanish_m: f64) -> Value {
     })
 }
 
-/// Geometric error of each tile's billboards: no smaller than that of its parts.
-fn errors(tiles: &[Tile], focal_px: f64) -> Vec<f64> {
-    let mut out: Vec<f64> = tiles
-        .iter()
-        .map(|t| match t.billboards {
-            Some(_) => CLIENT_PX * f64::from(t.switch_distance_m) / focal_px,
-            None => 0.0,
-        })
-        .collect();
-    for i in (1..tiles.len()).rev() {
-        if let Some(parent) = tiles[i].parent {
-            out[parent as usize] = out[parent as usize].max(out[i]);
-        }
-    }
-    out
+/// Geometric error of a tile's billboards; as its switch distance it is no smaller than that of its
+/// parts, and nothing where it has none.
+fn error(tile: &Tile, focal_px: f64) -> f64 {
+    CLIENT_PX * f64::from(tile.switch_distance_m) / focal_px
 }
 
-fn tile(tiles: &[Tile], errors: &[f64], index: u32) -> Value {
+fn tile(tiles: &[Tile], focal_px: f64, index: u32) -> Value {
     let tile_at = &tiles[index as usize];
     let children = tile_at.children.iter();
-    let mut below: Vec<Value> = children.map(|&c| tile(tiles, errors, c)).collect();
+    let mut below: Vec<Value> = children.map(|&c| tile(tiles, focal_px, c)).collect();
     let volume = volume(tile_at);
     let content = |file: &str| json!({ "uri": file });
-    let mut out = json!({ "boundingVolume": volume, "geometricError": errors[index as usize] });
+    let mut out = json!({ "boundingVolume": volume, "geometricError": error(tile_at, focal_px) });
     match (&tile_at.billboards, &tile_at.geometry) {
         (Some(billboards), geometry) => {
             out["content"] = content(&billboards.file);
@@ -112,14 +101,13 @@ mod tests {
         let whole = Tile {
             children: vec![1, 2],
             radius_m: 2.0,
-            switch_distance_m: 10.0,
+            switch_distance_m: 20.0,
             billboards: Some(Billboards {
                 file: "whole.glb".into(),
                 ..Billboards::default()
             }),
             ..Tile::default()
         };
-        // The second tip is worse than the whole tree: the tree must not hide that.
         let tiles = [whole, tip(0, 4.0), tip(0, 20.0)];
         let set = tileset(&tiles, 1000.0, 500.0);
         // 16 px x 20 m / 1000 px; at 20 m that is 16 px on the screen.

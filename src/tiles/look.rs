@@ -75,17 +75,18 @@ pub fn look(
         most_error_px: Some(recipe.tile_error_px),
     };
     let level = baker.level(request, watch)?;
+    let texel = f64::from(tree.model.height() / level.request.height_texels);
     Ok(Some(Look {
         error: baker.rms_error(&level.plan),
-        texel: f64::from(tree.model.height() / level.request.height_texels),
-        coverage: shown(tree, &level),
+        texel,
+        coverage: shown(tree, &level, VALID_TEXELS * texel),
         sigma: sigma(tree, &elements),
         level,
     }))
 }
 
-/// What the cards show, each of its own leaves.
-fn shown(tree: &Tree, level: &Level) -> Coverage {
+/// What the cards show, each of its own leaves within `epsilon`.
+fn shown(tree: &Tree, level: &Level, epsilon: f64) -> Coverage {
     let mut out = Coverage::default();
     let mut square = 0.0;
     for group in &level.plan.cards {
@@ -99,7 +100,7 @@ fn shown(tree: &Tree, level: &Level) -> Coverage {
             connector: tree.subtrees[0].connector,
         };
         let cards = std::slice::from_ref(&group.card);
-        let found = coverage(&foliage, cards, VALID_TEXELS / f64::from(DENSITY));
+        let found = coverage(&foliage, cards, epsilon);
         out.valid += found.valid;
         out.invalid += found.invalid;
         out.total += found.total;

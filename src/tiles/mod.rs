@@ -14,7 +14,7 @@ use crate::botany::tree::Tree;
 use crate::detail::tiles::{self, TileSize, tiles};
 use crate::error::Result;
 use crate::export::hierarchy::{
-    TileFiles, places, write_billboards, write_geometry, write_hierarchy,
+    TileFiles, Tips, places, write_billboards, write_geometry, write_hierarchy,
 };
 use crate::export::manifest_tiles::{Billboards, Geometry, Tile, Tiles};
 use crate::export::package::Package;
@@ -154,7 +154,8 @@ fn write(
         atlas: page,
         list,
     };
-    let all = write_hierarchy(&tree.model, files, &rectangles, page)?;
+    let tips = Tips::new(&tree.model, files)?;
+    let all = write_hierarchy(&tree.model, files, &tips, &rectangles, page)?;
     package.write(&out.file, &all)?;
     drop(all);
     for (tile, files) in out.list.iter().zip(files) {
@@ -162,18 +163,20 @@ fn write(
             package.write(&b.file, &bytes)?;
         }
     }
-    let (images, geometry) = write_geometry(&tree.model, files, name)?;
-    for (image, png) in &images {
+    let images: Vec<String> = (0..tips.pngs.len())
+        .map(|i| format!("{name}_image_{i}.png"))
+        .collect();
+    for (image, png) in images.iter().zip(&tips.pngs) {
         package.write(image, png)?;
     }
-    let tips = out.list.iter().filter_map(|t| t.geometry.as_ref());
-    for (tip, bytes) in tips.zip(geometry) {
+    let named = out.list.iter().filter_map(|t| t.geometry.as_ref());
+    for (tip, bytes) in named.zip(write_geometry(&tree.model, &tips, &images)?) {
         package.write(&tip.file, &bytes)?;
     }
     let vanish = scene.distance(height_m(tree), scene.vanish_height_px);
     let set = tileset(&out.list, scene.focal_px(), vanish);
     package.write(&out.tileset, format!("{set:#}\n").as_bytes())?;
-    Ok((out, images.into_iter().map(|(name, _)| name).collect()))
+    Ok((out, images))
 }
 
 fn height_m(tree: &Tree) -> f64 {

@@ -252,6 +252,22 @@ fn changed_json_values_never_panic() {
     }
 }
 
+#[test]
+fn seeds_of_the_fuzzer_load() {
+    let seeds = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fuzz/seeds");
+    let mut count = 0;
+    for entry in std::fs::read_dir(seeds).unwrap() {
+        let file = entry.unwrap().path();
+        assert!(
+            try_load(&std::fs::read(&file).unwrap()),
+            "{}",
+            file.display()
+        );
+        count += 1;
+    }
+    assert!(count >= 3, "{count}");
+}
+
 /// Writes the file that uses every feature as a seed for the fuzzer.
 #[test]
 #[ignore = "writes tests/fuzz/seeds"]
