@@ -29,7 +29,7 @@ pub enum Error {
         help: String,
     },
     /// A file can't be read or written.
-    #[error("{}: {doing}: {source}", file.display())]
+    #[error("{}: {doing}: {source}{}", file.display(), way_out(source.kind()))]
     Io {
         /// The file or folder.
         file: PathBuf,
@@ -67,6 +67,21 @@ pub enum Error {
         /// What it met.
         what: String,
     },
+}
+
+/// What helps against the commonest answers of an operating system.
+fn way_out(kind: std::io::ErrorKind) -> &'static str {
+    use std::io::ErrorKind;
+    match kind {
+        ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::FileTooLarge => {
+            "\n  help: make room, or write to another disk; what was there before is untouched"
+        }
+        ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => {
+            "\n  help: change the permissions of the folder, or choose another one"
+        }
+        ErrorKind::NotFound => "\n  help: check the name and the folder it is looked for in",
+        _ => "",
+    }
 }
 
 impl Error {

@@ -1,6 +1,6 @@
 //! The bake: every step in order, one line each. Read this first.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use serde_json::Value;
@@ -73,6 +73,9 @@ pub struct Baked {
 /// Azimuth of the first view of the report, degrees: not one of those that levels were fitted to.
 const REPORT_OFFSET_DEG: f32 = 11.0;
 
+/// Bytes of the longest name of a tree: the rest of 255 is for "_hierarchy.glb" and names of drafts.
+const LONGEST_NAME: usize = 220;
+
 /// Bakes a tree into a package: complete, or nothing.
 ///
 /// # Errors
@@ -86,6 +89,7 @@ pub fn bake(request: &Request, watch: &dyn Watch) -> Result<Baked> {
 fn made(request: &Request, watch: &dyn Watch) -> Result<Baked> {
     check(&request.scene)?;
     request.recipe.packer.check()?;
+    check_name(&request.input)?;
     let package = Package::start(&request.output, request.force)?;
     begin(watch, "load", 1)?;
     // Read once, so that what is described is what is baked (files that it refers to are read twice).
@@ -162,6 +166,21 @@ fn made(request: &Request, watch: &dyn Watch) -> Result<Baked> {
         files,
         warnings,
     })
+}
+
+/// File systems take names of 255 bytes, and a package's files are named after the tree.
+fn check_name(input: &Path) -> Result<()> {
+    let bytes = input.file_stem().map_or(0, |stem| stem.len());
+    if bytes <= LONGEST_NAME {
+        return Ok(());
+    }
+    Err(Error::usage(
+        format!(
+            "{}: the tree's name has {bytes} bytes, and the files of its package would have more than file systems take",
+            input.display()
+        ),
+        format!("rename it: {LONGEST_NAME} bytes before the extension at most"),
+    ))
 }
 
 /// Where a package comes from; `input` are the input's bytes.

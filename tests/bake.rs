@@ -260,7 +260,7 @@ fn all_levels_are_wired_in_one_file() {
 #[test]
 fn runs_and_threads_do_not_change_a_byte() {
     let place = Place::new();
-    for (output, threads) in [("a", "1"), ("b", "2"), ("c", "2")] {
+    for (output, threads) in [("a", "1"), ("b", "2"), ("c", "2"), ("d", "8")] {
         assert_eq!(
             place.code(output, &["--triangles", "40%,24", "--threads", threads]),
             0
@@ -273,6 +273,7 @@ fn runs_and_threads_do_not_change_a_byte() {
             "{name} differs between one thread and two"
         );
         assert!(read("b") == read("c"), "{name} differs between two runs");
+        assert!(read("a") == read("d"), "{name} differs with eight threads");
     }
 }
 

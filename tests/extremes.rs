@@ -210,3 +210,98 @@ fn leaves_in_one_point_are_one_and_a_tree_that_is_there_twice_is_one_tree() {
     };
     assert_eq!(figures(&twice), figures(&once));
 }
+
+/// One closed skin with bumps, around as many degrees as a globe has.
+fn blob() -> Part {
+    let (mut points, mut triangles) = (Vec::new(), Vec::new());
+    let (rings, sides) = (48u32, 96u32);
+    for i in 0..=rings {
+        let down = std::f32::consts::PI * i as f32 / rings as f32;
+        for j in 0..sides {
+            let round = std::f32::consts::TAU * j as f32 / sides as f32;
+            let out = Vec3::new(
+                down.sin() * round.cos(),
+                down.cos(),
+                down.sin() * round.sin(),
+            );
+            let bump = 1.0 + 0.25 * (5.0 * round).sin() * (4.0 * down).sin();
+            points.push(out * bump + Vec3::Y * 1.5);
+        }
+    }
+    for i in 0..rings {
+        for j in 0..sides {
+            let [a, b] = [j, (j + 1) % sides].map(|j| i * sides + j);
+            triangles.extend([[a, b, a + sides], [b, b + sides, a + sides]]);
+        }
+    }
+    (points, triangles)
+}
+
+/// A spring whose windings touch, and a figure of eight.
+fn knots() -> Part {
+    let spring = |i: u8| {
+        let angle = f32::from(i) * 0.3;
+        let out = Vec3::new(angle.cos(), 0.0, angle.sin());
+        (
+            out * 0.8 + Vec3::Y * 0.28 * angle / std::f32::consts::TAU,
+            [out, Vec3::Y],
+        )
+    };
+    let eight = |i: u8| {
+        let angle = f32::from(i) / 48.0 * std::f32::consts::TAU;
+        let at = Vec3::new(angle.sin(), 2.5 + (2.0 * angle).sin() * 0.6, 0.0);
+        let along = Vec3::new(angle.cos(), 1.2 * (2.0 * angle).cos(), 0.0).normalize();
+        (at, [along.cross(Vec3::Z), Vec3::Z])
+    };
+    let mut all = tube(&(0..120).map(spring).collect::<Vec<_>>(), false);
+    let (points, triangles) = tube(&(0..48).map(eight).collect::<Vec<_>>(), true);
+    let base = all.0.len() as u32;
+    all.0.extend(points);
+    all.1
+        .extend(triangles.iter().map(|t| t.map(|corner| corner + base)));
+    all
+}
+
+#[test]
+fn one_welded_skin_and_branches_that_touch_themselves_are_baked() {
+    let cases = [
+        ("blob", vec![("tree", blob())]),
+        (
+            "knots",
+            vec![("bark", knots()), ("leaf", leaves(100, 0.2, ball, false))],
+        ),
+    ];
+    for (name, parts) in cases {
+        let report = bake(&parts, &["--triangles", "20%,24"]);
+        let f1: Vec<f64> = report.levels.iter().map(|l| l.sizes[0].f1.mean).collect();
+        assert!(f1.len() == 2 && f1[0] > 0.9, "{name}: {f1:?}");
+    }
+}
+
+#[test]
+fn budgets_too_small_for_any_tree_and_endless_distances_say_what_is_possible() {
+    let home = tempfile::tempdir().unwrap();
+    write(&home.path().join("t.glb"), &[("bark", trunk())]);
+    std::fs::write(home.path().join("inf.ron"), "(nearest_m: inf)").unwrap();
+    std::fs::write(home.path().join("nan.ron"), "(farthest_m: NaN)").unwrap();
+    let cases = [
+        (["--triangles", "0"], "too few"),
+        (["--triangles", "1"], "too few"),
+        (["--triangles", "2"], "too few"),
+        (["--scene", "inf.ron"], "nearest_m is inf"),
+        (["--scene", "nan.ron"], "farthest_m is NaN"),
+    ];
+    for (arguments, word) in cases {
+        let done = Command::new(env!("CARGO_BIN_EXE_pleach"))
+            .args(["bake", "t.glb", "-o", "out", "--preset", "draft"])
+            .args(arguments)
+            .current_dir(home.path())
+            .output()
+            .unwrap();
+        let message = String::from_utf8_lossy(&done.stderr).into_owned();
+        assert_eq!(done.status.code(), Some(2), "{message}");
+        assert!(message.contains(word), "{message}");
+        assert!(message.contains("help:"), "{message}");
+        assert!(!home.path().join("out").exists());
+    }
+}

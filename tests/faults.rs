@@ -178,10 +178,57 @@ fn a_limit_of_file_sizes_leaves_the_old_package() {
     assert!(files(&output) == both[0]);
 }
 
+/// Needs a Linux that lets users mount in a namespace of their own; says so where it doesn't.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_leaves_the_old_package_and_names_the_file() {
+    let (home, tree) = home();
+    let (both, _) = packages(home.path(), &tree);
+    let bytes: usize = both[0].values().map(Vec::len).sum();
+    // Room for the old package and half of another.
+    let script = "mkdir disk && mount -t tmpfs -o size=$1 none disk || exit 99
+        cp -r a disk/out || exit 98
+        \"$2\" bake --preset draft --accept --quiet --triangles 200,24 -o disk/out tree.glb \\
+            --recipe tree.recipe --scene tree.scene 2> message
+        echo $? > code; ls disk > left; cp -r disk/out after";
+    let done = Command::new("unshare")
+        .args([
+            "--user",
+            "--map-root-user",
+            "--mount",
+            "sh",
+            "-c",
+            script,
+            "sh",
+        ])
+        .arg((bytes * 3 / 2).to_string())
+        .arg(env!("CARGO_BIN_EXE_pleach"))
+        .current_dir(home.path())
+        .output();
+    match done {
+        Ok(done) if done.status.success() => (),
+        other => return println!("skipped: no file system of one's own here: {other:?}"),
+    }
+    let read = |name: &str| std::fs::read_to_string(home.path().join(name)).unwrap();
+    let message = read("message");
+    assert_eq!(read("code").trim(), "2", "{message}");
+    assert!(message.contains("No space left"), "{message}");
+    assert!(message.contains("help:"), "{message}");
+    assert_eq!(read("left").trim(), "out", "nothing half-written is left");
+    assert!(files(&home.path().join("after")) == both[0]);
+}
+
 #[test]
 fn names_with_spaces_quotes_and_other_letters_are_names() {
     let (home, tree) = home();
-    for name in ["two words", "a 'quoted' one", "naïve-树", "100%25", "-dash"] {
+    for name in [
+        "two words",
+        "a 'quoted' one",
+        "naïve-树",
+        "100%25",
+        "-dash",
+        &"x".repeat(220),
+    ] {
         let input = home.path().join(format!("{name}.glb"));
         std::fs::copy(&tree, &input).unwrap();
         let output = home.path().join(format!("of {name}"));
@@ -196,4 +243,19 @@ fn names_with_spaces_quotes_and_other_letters_are_names() {
             found.keys()
         );
     }
+    // What no file system takes is said before the work.
+    let long = home.path().join("x".repeat(240) + ".glb");
+    std::fs::copy(&tree, &long).unwrap();
+    let done = Command::new(env!("CARGO_BIN_EXE_pleach"))
+        .args([
+            Path::new("bake"),
+            &long,
+            Path::new("-o"),
+            &home.path().join("never"),
+        ])
+        .output()
+        .unwrap();
+    let message = String::from_utf8(done.stderr).unwrap();
+    assert_eq!(done.status.code(), Some(2), "{message}");
+    assert!(message.contains("rename it") && !home.path().join("never").exists());
 }

@@ -286,6 +286,34 @@ fn back_faces_are_drawn_only_if_double_sided() {
     assert!(picture.normal.contains(&Vec3::NEG_Z));
 }
 
+#[test]
+fn a_card_edge_on_to_the_eye_covers_nothing_and_next_to_that_next_to_nothing() {
+    let both = [Material {
+        double_sided: true,
+        ..opaque()[0]
+    }];
+    let shape = Shape::default().rectangle(Vec2::splat(-3.0), Vec2::splat(3.0), 0.0);
+    let scene = scene(&shape, &both, &[]);
+    for tilt in [0.0, 1e-7, 1e-3, 0.1] {
+        let tilt: f32 = tilt;
+        let forward = Vec3::new(-tilt.cos(), 0.0, -tilt.sin());
+        // Beside the grid of samples, so that what is narrower than their distance falls between them.
+        let target = Vec3::new(0.0, 0.0, 0.01);
+        let orthographic = Camera::orthographic(forward, Vec3::Y, target, 1.0, 8, 8);
+        let eye = -forward * 9.0;
+        let perspective = Camera::perspective(eye, Vec3::ZERO, Vec3::Y, 1.0, 8, 8);
+        for camera in [orthographic, perspective] {
+            let area = coverage(&scene, &camera, GRID4).area();
+            let picture = draw(&scene, &camera, GRID4).shade(&scene, &camera, GRID4, Light::Unlit);
+            assert!(picture.normal.iter().all(|n| n.is_finite()), "{tilt}");
+            // Six times six units, turned away; one column of samples is a quarter of eight pixels.
+            let most = 36.0 * f64::from(tilt.sin()) + 2.0;
+            assert!(area <= most, "{tilt}: {area}");
+            assert!(tilt > 0.0 || area == 0.0, "{area}");
+        }
+    }
+}
+
 /// A closed ball of triangles of very different sizes, turned so that no edge is straight.
 fn ball(rings: u32, sectors: u32) -> Shape {
     let mut shape = Shape::default();

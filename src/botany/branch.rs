@@ -116,6 +116,7 @@ fn model(whole: &Model, triangles: &[u32]) -> (Model, Place) {
         objects: whole.objects.clone(),
         materials: whole.materials.clone(),
         images: whole.images.clone(),
+        position_step: whole.position_step,
         ..Model::default()
     };
     (model, place)

@@ -39,6 +39,9 @@ pub struct Model {
     pub images: Vec<Image>,
     /// Trouble that was repaired or ignored, counted, each kind said once.
     pub warnings: Vec<String>,
+    /// How far apart neighbouring positions of the file are where its numbers are coarsest, in world units: what
+    /// f32 far from a mesh's origin, or integers, had lost before `pleach` read them.
+    pub position_step: f64,
     /// Bytes of the file and its external buffers and images.
     pub file_bytes: u64,
 }
@@ -203,6 +206,15 @@ impl Model {
     /// The corners of a triangle.
     pub fn corners(&self, triangle: u32) -> [Vec3; 3] {
         self.triangles[triangle as usize].map(|i| self.positions[i as usize])
+    }
+
+    /// Keeps the triangles that `keep` says yes to; their vertices all stay.
+    pub fn retain_triangles(&mut self, keep: impl Fn(u32) -> bool) {
+        let mut numbers = 0..;
+        self.triangles.retain(|_| numbers.next().is_some_and(&keep));
+        let mut numbers = 0..;
+        self.triangle_object
+            .retain(|_| numbers.next().is_some_and(&keep));
     }
 
     /// Forgets the pixels of images that are no base colour: enough to measure silhouettes and

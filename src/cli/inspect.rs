@@ -131,7 +131,11 @@ impl Summary {
             "leaves_by_order": self.leaves_by_order,
             "skeleton_nodes": tree.skeleton.nodes.len(),
             "subtrees": tree.subtrees.len(),
-            "world": { "center_m": tree.model.frame.center.to_array(), "radius_m": tree.model.frame.radius },
+            "world": {
+                "center_m": tree.model.frame.center.to_array(),
+                "radius_m": tree.model.frame.radius,
+                "position_step_m": tree.model.position_step,
+            },
             "warnings": self.warnings(tree),
             "pictures": pictures,
             "seconds": { "load": loaded, "recognise": recognised },
@@ -164,6 +168,10 @@ impl Summary {
             println!("  order {order}  {chains} branches with {leaves} leaves");
         }
         println!("sub-trees  {}", tree.subtrees.len());
+        println!(
+            "positions  every {:.1e} m of a radius of {:.3} m",
+            tree.model.position_step, tree.model.frame.radius
+        );
         println!("time       {loaded:.2} s to load, {recognised:.2} s to recognise");
         for warning in self.warnings(tree) {
             println!("warning: {warning}");

@@ -141,6 +141,7 @@ pub fn evaluate(
     }
     let levels = measured;
     Report {
+        position_step_m: original.0.position_step,
         original: rows.pop(),
         levels,
         ..Report::default()

@@ -8,6 +8,10 @@ use serde::{Deserialize, Serialize};
 /// Everything that was measured.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Report {
+    /// How far apart neighbouring positions of the original's file are where its numbers are coarsest, metres: no
+    /// length below it means anything.
+    #[serde(default)]
+    pub position_step_m: f64,
     /// The original, drawn as an engine draws it: what the levels replace.
     pub original: Option<Level>,
     /// The levels, nearest first.

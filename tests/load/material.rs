@@ -26,7 +26,7 @@ fn textured(material: Value, images: &[&[u8]]) -> File {
 
 #[test]
 fn a_material_is_carried_as_the_file_says() {
-    let png = png(2, 3, [10, 20, 30, 40]);
+    let png = png(2, 3, [10, 20, 30, 140]);
     let mut file = textured(
         json!({
             "name": "leaf", "alphaMode": "MASK", "alphaCutoff": 0.3, "doubleSided": true,
@@ -68,7 +68,7 @@ fn a_material_is_carried_as_the_file_says() {
     assert_eq!(m.emissive, Some(base));
     assert_eq!((model.images[0].width, model.images[0].height), (2, 3));
     // Straight alpha, colour untouched.
-    assert_eq!(*model.images[0].rgba, [10, 20, 30, 40].repeat(6));
+    assert_eq!(*model.images[0].rgba, [10, 20, 30, 140].repeat(6));
     assert!(model.warnings.is_empty());
 }
 
@@ -88,6 +88,42 @@ fn alpha_modes_are_kept_and_factors_clamped() {
     assert_eq!(model.materials[0].metallic_factor, 0.0);
     assert_eq!(model.materials[0].base_color_factor, [1.0, 0.0, 0.0, 1.0]);
     assert_eq!(model.warnings.len(), 1);
+}
+
+#[test]
+fn what_no_alpha_test_lets_pass_is_left_out_and_said() {
+    let two = |alpha: u8, mode: &str, factor: f64| {
+        let mut file = textured(
+            json!({
+                "name": "leaf", "alphaMode": mode,
+                "pbrMetallicRoughness": {
+                    "baseColorTexture": { "index": 0 }, "baseColorFactor": [1, 1, 1, factor],
+                },
+            }),
+            &[&png(2, 2, [9, 9, 9, alpha])],
+        );
+        let bark = file.floats("VEC3", &[0.0, 5.0, 0.0, 2.0, 5.0, 0.0, 0.0, 7.0, 0.0]);
+        file.mesh(json!({ "attributes": { "POSITION": bark } }));
+        file
+    };
+    let triangles = |file: File| file.load().unwrap().triangles.len();
+    assert_eq!(triangles(two(128, "MASK", 1.0)), 2);
+    assert_eq!(triangles(two(0, "OPAQUE", 1.0)), 2);
+    for (alpha, mode, factor) in [(127, "MASK", 1.0), (255, "MASK", 0.4), (0, "BLEND", 1.0)] {
+        let model = two(alpha, mode, factor).load().unwrap();
+        assert_eq!(model.triangles.len(), 1);
+        let [warning] = model.warnings.as_slice() else {
+            panic!("{:?}", model.warnings);
+        };
+        assert!(
+            warning.contains("left out (material \"leaf\")"),
+            "{warning}"
+        );
+    }
+    let mut alone = two(0, "MASK", 1.0);
+    alone.json["scenes"][0]["nodes"] = json!([0]);
+    let error = alone.load().unwrap_err().to_string();
+    assert!(error.contains("no triangle shows anything"), "{error}");
 }
 
 #[test]

@@ -228,3 +228,39 @@ fn what_is_not_shown_is_not_read() {
     assert_eq!(model.warnings.len(), 3, "{:?}", model.warnings);
     assert_eq!(model.objects.len(), 1);
 }
+
+#[test]
+fn what_a_file_had_lost_before_it_was_read_is_said() {
+    // Largest coordinates 2, 2 and 0: below 2, f32 has steps of 2^-23.
+    let model = File::triangle().load().unwrap();
+    let step = 2f64.sqrt() / f64::from(1 << 23);
+    assert!((model.position_step / step - 1.0).abs() < 1e-9);
+    assert!(model.warnings.is_empty());
+    // 100 km away by its node nothing is lost, in its numbers steps of 2^-7.
+    let far = |x: f32, node: Value| {
+        let mut file = File::new();
+        let p = file.floats("VEC3", &[x, 0.0, 0.0, x + 2.0, 0.0, 0.0, x, 2.0, 0.0]);
+        file.mesh(json!({ "attributes": { "POSITION": p } }));
+        file.json["nodes"][0]["translation"] = node;
+        file.load().unwrap()
+    };
+    let by_node = far(0.0, json!([1e5, 0, 0]));
+    assert_eq!(by_node.position_step, model.position_step);
+    assert!(by_node.warnings.is_empty());
+    let in_numbers = far(1e5, json!([0, 0, 0]));
+    assert!((in_numbers.position_step * 128.0 - 1.0).abs() < 1e-6);
+    let [warning] = in_numbers.warnings.as_slice() else {
+        panic!("{:?}", in_numbers.warnings);
+    };
+    assert!(warning.contains("5.5e-3 of the tree's radius"), "{warning}");
+    // Integers have steps of one: KHR_mesh_quantization.
+    let mut file = File::new();
+    let corners = [0u8, 0, 0, 0, 200, 0, 0, 0, 0, 100, 0, 0];
+    let p = file.accessor(&corners, super::file::U8, "VEC3", 3);
+    let view = file.json["accessors"][p]["bufferView"].as_u64().unwrap();
+    file.json["bufferViews"][view as usize]["byteStride"] = json!(4);
+    file.mesh(json!({ "attributes": { "POSITION": p } }));
+    file.json["extensionsUsed"] = json!(["KHR_mesh_quantization"]);
+    let model = file.load().unwrap();
+    assert!((model.position_step - 3f64.sqrt()).abs() < 1e-12);
+}

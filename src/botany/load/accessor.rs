@@ -1,5 +1,7 @@
 //! Accessors: checked reading of typed elements, sparse or not, quantised or not.
 
+use glam::{DVec3, Vec3};
+
 use super::buffer::{Asset, BROKEN};
 use super::json::Accessor;
 use crate::Result;
@@ -257,6 +259,25 @@ impl<'a> Asset<'a> {
             }
         }
         Ok(out)
+    }
+
+    /// How far neighbouring positions of an accessor lie apart where `values`, read from it, are coarsest: one unit of
+    /// an integer (KHR_mesh_quantization), else one unit in the last place of the largest f32 along each axis.
+    pub fn step(&self, index: usize, values: &[Vec3], place: &str) -> Result<DVec3> {
+        let accessor = self.accessor(index, place)?;
+        let most = match accessor.component_type {
+            5120 => 127.0,
+            5121 => 255.0,
+            5122 => 32767.0,
+            5123 => 65535.0,
+            _ => {
+                let largest = values.iter().fold(Vec3::ZERO, |most, v| most.max(v.abs()));
+                let below = largest.to_array().map(f32::next_down);
+                return Ok(largest.as_dvec3() - Vec3::from_array(below).as_dvec3());
+            }
+        };
+        let unit = if accessor.normalized { 1.0 / most } else { 1.0 };
+        Ok(DVec3::splat(unit))
     }
 }
 

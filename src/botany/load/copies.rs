@@ -36,10 +36,7 @@ pub(super) fn drop_copies(model: &mut Model) -> u64 {
     }
     let count = dropped.iter().filter(|d| **d).count() as u64;
     if count > 0 {
-        let mut at = dropped.iter();
-        model.triangles.retain(|_| at.next() == Some(&false));
-        let mut at = dropped.iter();
-        model.triangle_object.retain(|_| at.next() == Some(&false));
+        model.retain_triangles(|t| !dropped[t as usize]);
     }
     count
 }

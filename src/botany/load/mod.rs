@@ -26,6 +26,7 @@ mod primitive;
 mod scene;
 mod skin;
 mod triangle;
+mod unseen;
 mod uri;
 mod warning;
 
@@ -129,6 +130,7 @@ pub fn load_slice(bytes: &[u8], path: &Path, limits: &Limits) -> Result<Model> {
     let mut file_bytes = asset.file_bytes;
     model.images = image::decode_all(&asset, &materials.images, &mut file_bytes)?;
     model.materials = std::mem::take(&mut materials.list);
+    unseen::drop_unseen(&asset, &mut model, &mut warnings)?;
     let copies = copies::drop_copies(&mut model);
     warnings.count("a triangle lies exactly on another: dropped", copies, "");
     model.file_bytes = file_bytes;

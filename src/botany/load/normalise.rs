@@ -18,6 +18,9 @@ const LEAST_AREA: f64 = 1e-15;
 /// Least radius in world units; below it, divisions by it leave the numbers.
 const LEAST_RADIUS: f64 = 1e-60;
 
+/// Share of the radius from which a file's grid shows: a seventh of a pixel where a tree is 512 pixels high.
+const COARSE: f64 = 1.0 / 2048.0;
+
 /// Builds the model, without materials and images.
 pub(super) fn assemble(
     asset: &Asset,
@@ -30,6 +33,15 @@ pub(super) fn assemble(
         frame: frame(asset, &placements, &parts)?,
         ..Model::default()
     };
+    model.position_step = step(&placements, &parts);
+    if model.position_step > COARSE * model.frame.radius {
+        let what = format!(
+            "positions are stored to {:.1e} of the tree's radius only: the shape between is lost; in the tool that \
+             wrote the file, move the tree to the origin of its mesh (the node may be anywhere)",
+            model.position_step / model.frame.radius
+        );
+        warnings.say(&what, "");
+    }
     totals.reserve(&mut model);
     // A mesh is freed after its last placement, so that a tree without instances is in memory
     // once, not twice.
@@ -126,6 +138,19 @@ fn frame(asset: &Asset, placements: &[Placement], parts: &Parts) -> Result<Frame
         return Err(asset.fault("scene", what, "apply transforms before the export"));
     }
     Ok(Frame { center, radius })
+}
+
+/// The coarsest grid that positions of the file lie on, in the world: the diagonal of its cells.
+fn step(placements: &[Placement], parts: &Parts) -> f64 {
+    let steps = placements.iter().flat_map(|placement| {
+        let turn = DMat3::from_mat4(placement.world_from_mesh);
+        let axes = [turn.x_axis, turn.y_axis, turn.z_axis].map(DVec3::length);
+        let along = DVec3::from_array(axes);
+        parts[placement.mesh]
+            .iter()
+            .map(move |part| (part.step * along).length())
+    });
+    steps.fold(0.0, f64::max)
 }
 
 fn for_each_point(placements: &[Placement], parts: &Parts, mut act: impl FnMut(DVec3)) {

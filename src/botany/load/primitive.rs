@@ -1,6 +1,6 @@
 //! Primitives: accessors become the triangles of one part in its own space.
 
-use glam::{Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 
 use super::accessor::Integers;
 use super::buffer::{Asset, BROKEN};
@@ -21,6 +21,8 @@ pub(super) struct Part {
     pub uvs: [Vec<Vec2>; 2],
     pub colors: Vec<[f32; 4]>,
     pub triangles: Vec<[u32; 3]>,
+    /// The grid that the file's numbers lie on, along each axis, in the mesh's unit.
+    pub step: DVec3,
 }
 
 /// Parts of each mesh; empty for meshes that no placement uses.
@@ -105,6 +107,7 @@ impl Reader<'_> {
         let kept = renumber(&mut triangles);
         let used: Vec<u32> = kept.iter().map(|&k| used[k as usize]).collect();
         let positions: Vec<Vec3> = kept.iter().map(|&k| positions[k as usize]).collect();
+        let step = self.asset.step(position, &positions, &place)?;
 
         // 4. The other attributes.
         let normals = self.normals(&used, &positions, &triangles, warnings)?;
@@ -122,6 +125,7 @@ impl Reader<'_> {
             uvs,
             colors,
             triangles,
+            step,
         }))
     }
 

@@ -1,0 +1,115 @@
+//! Many bakes in one process: what one tree takes, the next one gets.
+
+use std::path::Path;
+
+use glam::Vec3;
+use pleach::pipeline::{Request, Wanted, bake};
+use pleach::recipe::{Preset, Recipe};
+use pleach::scene::Scene;
+use pleach::space::glb::GlbBuilder;
+use pleach::watch::Unwatched;
+use serde_json::json;
+
+/// Resident bytes of this process; `None` where the system doesn't tell.
+fn resident() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find(|l| l.starts_with("VmRSS:"))?;
+    let kib: u64 = line.split_whitespace().nth(1)?.parse().ok()?;
+    Some(kib * 1024)
+}
+
+/// A trunk of one quadrilateral under 30 to 60 leaves; another tree for each seed.
+fn tree(seed: u64) -> Vec<u8> {
+    let mut state = seed * 2 + 1;
+    let mut next = || {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1);
+        (state >> 40) as f32 / (1u64 << 24) as f32 - 0.5
+    };
+    let mut some = |scale: f32| Vec3::new(next(), next(), next()) * scale;
+    let mut points = vec![Vec3::ZERO, Vec3::X * 0.1, Vec3::new(0.1, 1.0, 0.0), Vec3::Y];
+    for _ in 0..30 + seed % 31 {
+        let (center, u, v) = (some(1.5) + Vec3::Y * 1.5, some(0.4), some(0.4));
+        points.extend([center - u, center - v, center + u, center + v]);
+    }
+    let quads = 0..points.len() as u32 / 4;
+    let triangles: Vec<[u32; 3]> = quads
+        .flat_map(|q| [[4 * q, 4 * q + 1, 4 * q + 2], [4 * q, 4 * q + 2, 4 * q + 3]])
+        .collect();
+    let mut glb = GlbBuilder::default();
+    let position = glb.positions(&points);
+    let indices = glb.indices(&triangles, points.len());
+    let primitive = json!({ "attributes": { "POSITION": position }, "indices": indices });
+    glb.finish(json!({
+        "asset": { "version": "2.0" }, "scene": 0, "scenes": [{ "nodes": [0] }],
+        "nodes": [{ "mesh": 0 }], "meshes": [{ "primitives": [primitive] }],
+    }))
+}
+
+/// Bakes `count` small trees, no two alike; returns what was resident after each.
+fn bakes(count: u64) -> Vec<u64> {
+    let home = tempfile::tempdir().unwrap();
+    let input = home.path().join("tree.glb");
+    let request = |output: &Path| Request {
+        input: input.clone(),
+        output: output.to_path_buf(),
+        recipe: Recipe {
+            training_views: 4,
+            refine_rounds: 1,
+            ..Recipe::preset(Preset::Draft)
+        },
+        scene: Scene {
+            screen_height_px: 256,
+            heights_px: vec![32.0, 16.0],
+            ..Scene::default()
+        },
+        wanted: Wanted::Levels(2),
+        accept: true,
+        ..Request::default()
+    };
+    let one = |seed: u64| {
+        std::fs::write(&input, tree(seed)).unwrap();
+        let output = home.path().join(format!("{seed}"));
+        let baked = bake(&request(&output), &Unwatched).unwrap();
+        assert_eq!(baked.report.levels.len(), 2);
+        std::fs::remove_dir_all(&output).unwrap();
+        resident().unwrap_or(0)
+    };
+    (0..count).map(one).collect()
+}
+
+/// Memory at the end over that after `warm` bakes; the largest of some, because one bake is larger than another.
+fn growth(resident: &[u64], warm: usize) -> f64 {
+    let most = |part: &[u64]| part.iter().copied().max().unwrap_or(0) as f64;
+    let (start, end) = (
+        most(&resident[..warm]),
+        most(&resident[resident.len() - 7..]),
+    );
+    println!(
+        "{} bakes: {:.1} MB after {warm}, {:.1} MB at the end",
+        resident.len(),
+        start / 1e6,
+        end / 1e6
+    );
+    end / start
+}
+
+#[test]
+fn memory_does_not_grow_from_tree_to_tree() {
+    match resident() {
+        Some(_) => assert!(growth(&bakes(30), 15) < 1.1),
+        None => println!("skipped: this system does not tell a process's memory"),
+    }
+}
+
+/// `cargo test --release --test long -- --ignored --nocapture`
+#[test]
+#[ignore = "takes minutes"]
+fn a_thousand_trees_need_the_memory_of_a_hundred() {
+    assert!(
+        resident().is_some(),
+        "this system does not tell a process's memory"
+    );
+    assert!(growth(&bakes(1000), 100) < 1.02);
+}
