@@ -158,11 +158,12 @@ fn every_leaf_is_under_exactly_one_drawn_node_in_every_frame() {
             occlusion: Occlusion::new(&cells, Law::Beer),
         },
     );
+    cut.fade = 0.0;
     let (mut drawn, mut sizes) = (Vec::new(), std::collections::BTreeSet::new());
     for view in path(300) {
         cut.update(&view);
         drawn.clear();
-        cut.collect(&view, 0.0, &mut drawn);
+        cut.collect(&view, &mut drawn);
         assert!(times_covered(&hierarchy, &drawn).iter().all(|&n| n == 1));
         sizes.insert(drawn.len());
     }
@@ -262,11 +263,12 @@ fn children_are_drawn_until_their_parent_has_faded_in() {
     };
     let hierarchy = Hierarchy::new(&[whole, half(1.0), half(-1.0)]).unwrap();
     let mut cut = ActiveCut::new(hierarchy, Place::at(Vec3::ZERO), Plain);
+    cut.fade = 0.2;
     let mut fades = |x: f32| -> Vec<(u32, f32)> {
         let view = View::looking(Vec3::X * x, Vec3::NEG_X, 1.0, 1.0);
         cut.update(&view);
         let mut drawn = Vec::new();
-        cut.collect(&view, 0.2, &mut drawn);
+        cut.collect(&view, &mut drawn);
         drawn
             .iter()
             .map(|d| (d.node, (d.fade * 100.0).round() / 100.0))
@@ -303,10 +305,11 @@ fn a_sparse_crown_is_as_visible_from_behind_as_from_the_front() {
             Place::at(Vec3::ZERO),
             Density { strength: 1.0 },
         );
+        cut.fade = 0.0;
         let view = View::looking(Vec3::X * 10.0, Vec3::NEG_X, 1.0, 1.0);
         cut.update(&view);
         let mut drawn = Vec::new();
-        cut.collect(&view, 0.0, &mut drawn);
+        cut.collect(&view, &mut drawn);
         drawn
             .iter()
             .map(|d| d.form == Form::Geometry)
@@ -385,13 +388,14 @@ fn a_double_zoom_is_half_the_distance() {
     let mut drawn = [Vec::new(), Vec::new()];
     for (zoom, out) in [1.0, 2.0].into_iter().zip(&mut drawn) {
         let mut cut = ActiveCut::new(species(4), Place::at(Vec3::ZERO), Plain);
+        cut.fade = 0.0;
         let eye = Vec3::new(30.0, 5.0, 0.0) * zoom;
         let view = View {
             zoom,
             ..View::looking(eye, Vec3::NEG_X, 1.0, 1.0)
         };
         cut.update(&view);
-        cut.collect(&view, 0.0, out);
+        cut.collect(&view, out);
     }
     // Not twice the same, since sub-trees keep their places; about the same number.
     let [a, b] = drawn.map(|d| d.len() as f32);

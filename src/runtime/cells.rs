@@ -7,6 +7,7 @@ use glam::{IVec3, Vec3};
 pub struct Cells {
     low: Vec3,
     edge: Vec3,
+    per_edge: Vec3,
     count: IVec3,
     solidity: Vec<f32>,
     /// `-ln(1 - solidity)`: infinite where nothing passes.
@@ -22,9 +23,11 @@ impl Cells {
         let count = IVec3::from_array(count.map(|c| (c.min(MAX_COUNT as u32) as i32).max(1)));
         let extent = (high - low).max(Vec3::splat(1e-6));
         let all = (count.x * count.y * count.z) as usize;
+        let edge = extent / count.as_vec3();
         Self {
             low,
-            edge: extent / count.as_vec3(),
+            edge,
+            per_edge: edge.recip(),
             count,
             solidity: vec![0.0; all],
             extinction: vec![0.0; all],
@@ -84,7 +87,10 @@ impl Cells {
     /// The cell that a point is in, also outside the grid.
     #[inline]
     pub fn cell_of(&self, point: Vec3) -> IVec3 {
-        ((point - self.low) / self.edge).floor().as_ivec3()
+        // `floor` is a call into the C library on plain x86-64.
+        let at = (point - self.low) * self.per_edge;
+        let cut = at.as_ivec3();
+        cut.saturating_sub(IVec3::from(at.cmplt(cut.as_vec3())))
     }
 
     /// Middle of a cell.
@@ -96,8 +102,9 @@ impl Cells {
         self.index(cell).map_or(0.0, |i| self.solidity[i])
     }
 
-    pub(super) fn extinction_at(&self, cell: IVec3) -> f32 {
-        self.index(cell).map_or(0.0, |i| self.extinction[i])
+    /// `-ln(1 - solidity)` of each cell, as [`Cells::solidity`].
+    pub(super) fn extinction(&self) -> &[f32] {
+        &self.extinction
     }
 }
 

@@ -34,12 +34,14 @@ pub struct DotProduct {
 }
 
 impl Visibility for Density {
+    #[inline]
     fn sight(&mut self, node: &Node, _: u32, eye: Vec3, _: &Place) -> Sight {
         scaled(node, eye, self.strength * node.density.min(1.0))
     }
 }
 
 impl Visibility for DotProduct {
+    #[inline]
     fn sight(&mut self, node: &Node, _: u32, eye: Vec3, _: &Place) -> Sight {
         scaled(node, eye, self.strength)
     }

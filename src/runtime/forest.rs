@@ -1,10 +1,9 @@
 //! Many trees: a cut through each, kept by splits and merges between frames.
 
-use glam::Vec4;
-
-use super::active_cut::{Changes, Clock, Looking};
+use super::active_cut::{Changes, Clock};
 use super::hierarchy::Hierarchy;
-use super::place::{Place, Pyramid, View};
+use super::looking::{First, List, Looking, collect_still, least};
+use super::place::{Place, Pyramid, Spheres, View};
 use super::pool::{Pool, Slot};
 use super::visibility::Visibility;
 
@@ -42,15 +41,19 @@ pub struct Forest<V> {
     /// Share of its switch distance over which a node fades in over its children; 0 for none.
     pub fade: f32,
     clock: Clock,
-    /// For each tree its bounding sphere in the world: centre and radius.
-    spheres: Vec<Vec4>,
+    /// For each tree its bounding sphere in the world.
+    spheres: Spheres,
+    /// For each tree whether it may be in the picture.
+    inside: Vec<bool>,
     /// For each tree whether its cut rests on what is hidden.
     asked: Vec<bool>,
     /// For each tree the path at which its first node is due.
     due: Vec<f32>,
+    /// For each tree the path at which its first node may begin to fade.
+    fades: Vec<f32>,
     slots: Vec<Slot>,
     pool: Pool,
-    spare: (Vec<u32>, Vec<f32>),
+    spare: List,
 }
 
 impl<V: Visibility> Forest<V> {
@@ -69,12 +72,14 @@ impl<V: Visibility> Forest<V> {
         let most = species.iter().map(|s| s.nodes().len()).max().unwrap_or(0);
         let sphere = |p: &Place| {
             let (center, radius) = species[p.species as usize].sphere();
-            p.to_world(center).extend(radius * p.scale)
+            (p.to_world(center), radius * p.scale)
         };
         Self {
-            spheres: places.iter().map(sphere).collect(),
+            spheres: Spheres::new(places.iter().map(sphere)),
+            inside: vec![false; places.len()],
             asked: vec![false; places.len()],
             due: vec![0.0; places.len()],
+            fades: vec![0.0; places.len()],
             species,
             places,
             visibility,
@@ -82,20 +87,28 @@ impl<V: Visibility> Forest<V> {
             clock: Clock::default(),
             slots,
             pool,
-            spare: (Vec::with_capacity(most), Vec::with_capacity(most)),
+            spare: List::with_capacity(most),
         }
     }
 
     /// Follows the camera. Allocates only while lists grow to a size that they never had before.
     pub fn update(&mut self, view: &View) -> Changes {
         let epoch = self.visibility.epoch(view.eye);
-        let (all, hidden) = self.clock.tick(view, epoch);
+        let (all, hidden) = self.clock.tick(view, self.fade, epoch);
         let path = self.clock.path;
         let mut changes = Changes::default();
-        for tree in 0..self.due.len() {
-            let anew = all || (hidden && self.asked[tree]);
-            if anew || self.due[tree] <= path {
-                changes += self.refresh(tree, view, path, anew);
+        // Most trees are due in no frame: they are passed over in groups.
+        const TOGETHER: usize = 32;
+        for start in (0..self.due.len()).step_by(TOGETHER) {
+            let end = (start + TOGETHER).min(self.due.len());
+            if !all && !hidden && least(&self.due[start..end]) > path {
+                continue;
+            }
+            for tree in start..end {
+                let anew = all || (hidden && self.asked[tree]);
+                if anew || self.due[tree] <= path {
+                    changes += self.refresh(tree, view, path, anew);
+                }
             }
         }
         changes
@@ -104,23 +117,26 @@ impl<V: Visibility> Forest<V> {
     fn refresh(&mut self, tree: usize, view: &View, path: f32, all: bool) -> Changes {
         let (place, range) = (&self.places[tree], Pool::range(self.slots[tree]));
         let hierarchy = &self.species[place.species as usize];
-        let mut looking = Looking::new(hierarchy, &mut self.visibility, place, view, path);
-        let (nodes, dues) = (&self.pool.nodes[range.clone()], &mut self.pool.dues[range]);
-        if !all && let Some(due) = looking.still(nodes, dues) {
-            self.due[tree] = due;
+        let marks = (path, self.fade);
+        let mut looking = Looking::new(hierarchy, &mut self.visibility, place, view, marks);
+        let (nodes, dues, fades) = self.pool.list(range);
+        if !all && looking.still(nodes, dues, fades) {
             self.asked[tree] |= looking.asked;
+            let looked_at = looking.looked_at;
+            let first = First::of(dues, fades);
+            (self.due[tree], self.fades[tree]) = (first.due, first.fades);
             return Changes {
-                looked_at: looking.looked_at,
+                looked_at,
                 ..Changes::default()
             };
         }
-        let (new_nodes, new_dues) = (&mut self.spare.0, &mut self.spare.1);
-        let changes = looking.rebuild((nodes, dues), all, (new_nodes, new_dues));
+        let changes = looking.rebuild((nodes, dues, fades), all, &mut self.spare);
         self.asked[tree] = looking.asked || (self.asked[tree] && !all);
-        self.due[tree] = new_dues.iter().fold(f32::INFINITY, |a, &b| a.min(b));
+        let first = First::of(&self.spare.dues, &self.spare.fades);
+        (self.due[tree], self.fades[tree]) = (first.due, first.fades);
         self.slots[tree] = self
             .pool
-            .replace(tree as u32, self.slots[tree], new_nodes, new_dues);
+            .replace(tree as u32, self.slots[tree], &self.spare);
         changes
     }
 
@@ -131,26 +147,22 @@ impl<V: Visibility> Forest<V> {
             return;
         }
         let (pyramid, path) = (Pyramid::new(view), self.clock.path);
-        for (tree, (&sphere, &slot)) in self.spheres.iter().zip(&self.slots).enumerate() {
-            if !pyramid.meets(sphere.truncate(), sphere.w) {
+        pyramid.meets_all(&self.spheres, &mut self.inside);
+        for (tree, (&inside, &slot)) in self.inside.iter().zip(&self.slots).enumerate() {
+            if !inside {
                 continue;
             }
             let range = Pool::range(slot);
-            let (nodes, dues) = (&self.pool.nodes[range.clone()], &self.pool.dues[range]);
-            // Most trees are far: one billboard.
-            if let [0] = nodes {
-                out.push(Drawn {
-                    tree: tree as u32,
-                    node: 0,
-                    form: Form::Billboard,
-                    fade: 1.0,
-                });
+            let nodes = &self.pool.nodes[range.clone()];
+            if self.fades[tree] >= path {
+                collect_still(tree as u32, nodes, out);
                 continue;
             }
             let place = &self.places[tree];
             let hierarchy = &self.species[place.species as usize];
-            let mut looking = Looking::new(hierarchy, &mut self.visibility, place, view, path);
-            looking.collect(tree as u32, nodes, dues, self.fade, out);
+            let marks = (path, self.fade);
+            let mut looking = Looking::new(hierarchy, &mut self.visibility, place, view, marks);
+            looking.collect(tree as u32, nodes, &self.pool.fades[range], out);
         }
     }
 

@@ -44,6 +44,7 @@ mod cells;
 mod density;
 mod forest;
 mod hierarchy;
+mod looking;
 mod measured;
 mod occlusion;
 mod place;

@@ -42,6 +42,9 @@ pub struct Occlusion<'g> {
     computed: u64,
 }
 
+/// Share of a cell by which a crossing may miss the grid's edge: rounding, a million cells away.
+const ROUNDING: f64 = 1e-8;
+
 /// Eyes farther off than this many cells are moved nearer, along the line to the grid's middle.
 const FARTHEST: f32 = 1e6;
 
@@ -127,62 +130,111 @@ impl<'g> Occlusion<'g> {
 /// Walks from one cell's middle to another's and returns the occlusion probability there.
 fn walk(cells: &Cells, from: IVec3, to: IVec3, law: Law, clumping: f32) -> f32 {
     let way = to - from;
-    let steps = way.abs();
     let length = (way.as_vec3() * cells.edge()).length();
     let unit = match law {
         Law::Equation4 => cells.edge().length(),
         Law::Beer => cells.edge().element_sum() / 3.0,
     };
-    // Crossing number k of an axis is at the share (2 k + 1) / (2 steps) of the way: crossings of
-    // two axes at one corner give the same quotient, so that ties are ties.
-    let crossing = |axis: usize, k: i32| match steps[axis] {
-        0 => f64::INFINITY,
-        n => f64::from(2 * k + 1) / f64::from(2 * n),
-    };
     let Some(enter) = entry(cells, from, way) else {
         return 0.0;
     };
-    // Crossings that lie before the grid are taken in one leap.
-    let mut taken = IVec3::ZERO;
-    for axis in 0..3 {
-        let past = (enter * f64::from(steps[axis]) - 0.5).ceil() as i32;
-        taken[axis] = past.clamp(0, steps[axis]);
-    }
-    let mut at = enter;
-    let mut next = [0, 1, 2].map(|axis| crossing(axis, taken[axis]));
-    // Equation 4 multiplies what passes; Beer's law sums up the logarithm of it.
-    let (mut hidden, mut passing, mut depth) = (0.0f32, 1.0f32, 0.0f32);
-    loop {
-        let cell = from + way.signum() * taken;
-        let end = next[0].min(next[1]).min(next[2]).min(1.0);
-        let last = cell == to || end >= 1.0;
-        let portion = length * (end - at).max(0.0) as f32 / unit;
-        match law {
-            Law::Equation4 => {
-                let rho = cells.solidity_at(cell);
+    let crossings = Crossings::new(cells, from, way, enter);
+    let portion = f64::from(length / unit);
+    match law {
+        Law::Equation4 => {
+            let (mut hidden, mut passing) = (0.0f32, 1.0f32);
+            crossings.each(|cell, share, _| {
+                let rho = cells.solidity().get(cell).copied().unwrap_or(0.0);
                 hidden += rho * passing;
-                passing *= (1.0 - rho) * (-portion).exp();
-            }
-            Law::Beer => {
-                let extinction = cells.extinction_at(cell);
+                passing *= (1.0 - rho) * (-(portion * share) as f32).exp();
+                passing > 0.0
+            });
+            hidden.clamp(0.0, 1.0)
+        }
+        Law::Beer => {
+            let mut depth = 0.0f32;
+            crossings.each(|cell, share, last| {
+                let extinction = cells.extinction().get(cell).copied().unwrap_or(0.0);
                 if !last && extinction > 0.0 {
-                    depth += extinction * portion;
+                    depth += extinction * (portion * share) as f32;
                 }
-            }
+                depth < f32::INFINITY
+            });
+            (1.0 - (-depth * clumping).exp()).clamp(0.0, 1.0)
         }
-        if last || passing <= 0.0 || depth == f32::INFINITY {
-            let hidden = match law {
-                Law::Equation4 => hidden,
-                Law::Beer if depth == f32::INFINITY => 1.0,
-                Law::Beer => 1.0 - (-depth * clumping).exp(),
-            };
-            return hidden.clamp(0.0, 1.0);
-        }
-        at = end;
+    }
+}
+
+/// The cells between the middles of two, in order.
+///
+/// Crossing number k of an axis lies at the share (2 k + 1) / (2 steps) of the way. Shares are
+/// compared as whole numbers, over the common denominator: ties at corners are ties.
+struct Crossings {
+    /// Cell, and how far the next one along each axis is in the list of cells.
+    cell: usize,
+    stride: [isize; 3],
+    /// Crossings that are still to come.
+    left: [i32; 3],
+    /// The next crossing of each axis, and how far apart they are, over the denominator.
+    next: [i64; 3],
+    apart: [i64; 3],
+    denominator: i64,
+    /// Share of the way at which the first cell is entered.
+    enter: f64,
+}
+
+impl Crossings {
+    /// `enter`: the share of the way at which the grid begins.
+    fn new(cells: &Cells, from: IVec3, way: IVec3, enter: f64) -> Self {
+        let steps = way.abs();
+        let count = [0, 1, 2].map(|axis| i64::from(steps[axis].max(1)));
+        let others = [
+            count[1] * count[2],
+            count[0] * count[2],
+            count[0] * count[1],
+        ];
+        let mut taken = IVec3::ZERO;
         for axis in 0..3 {
-            if next[axis] <= end {
-                taken[axis] += 1;
-                next[axis] = crossing(axis, taken[axis]);
+            // Crossings up to where the grid begins are taken in one leap.
+            let past = (enter * f64::from(steps[axis]) + 0.5 + ROUNDING).floor() as i32;
+            taken[axis] = past.clamp(0, steps[axis]);
+        }
+        let (first, size) = (from + way.signum() * taken, cells.count());
+        let index = (first.z * size.y + first.y) * size.x + first.x;
+        let stride = [1, size.x, size.x * size.y];
+        Self {
+            cell: index.max(0) as usize,
+            stride: [0, 1, 2].map(|axis| (stride[axis] * way[axis].signum()) as isize),
+            left: [0, 1, 2].map(|axis| steps[axis] - taken[axis]),
+            next: [0, 1, 2].map(|axis| match steps[axis] {
+                0 => i64::MAX,
+                _ => (2 * i64::from(taken[axis]) + 1) * others[axis],
+            }),
+            apart: others.map(|o| 2 * o),
+            denominator: 2 * count[0] * others[0],
+            enter,
+        }
+    }
+
+    /// Calls `act` with each cell, its share of the way, and whether it is the last, until it says no.
+    #[inline]
+    fn each(mut self, mut act: impl FnMut(usize, f64, bool) -> bool) {
+        let unit = 1.0 / self.denominator as f64;
+        let mut at = self.enter;
+        loop {
+            let end = self.next[0].min(self.next[1]).min(self.next[2]);
+            let last = self.left == [0; 3];
+            let share = if last { 1.0 } else { end as f64 * unit };
+            if !act(self.cell, (share - at).max(0.0), last) || last {
+                return;
+            }
+            at = share;
+            for axis in 0..3 {
+                if self.next[axis] <= end {
+                    self.cell = self.cell.wrapping_add_signed(self.stride[axis]);
+                    self.left[axis] -= 1;
+                    self.next[axis] += self.apart[axis];
+                }
             }
         }
     }
@@ -213,6 +265,7 @@ fn entry(cells: &Cells, from: IVec3, way: IVec3) -> Option<f64> {
 /// Equation 5: the level of detail between the one that the view alone asks for and the lowest,
 /// `(1 - OP) * view + OP * lowest`. Any measure of detail that grows with it will do; cuts use one
 /// over the distance, with 0 for the lowest.
+#[inline]
 pub fn blend(view: f32, lowest: f32, occlusion: f32) -> f32 {
     (1.0 - occlusion) * view + occlusion * lowest
 }
@@ -230,10 +283,12 @@ pub struct Hidden<'g, V> {
 }
 
 impl<V: Visibility> Visibility for Hidden<'_, V> {
+    #[inline]
     fn sight(&mut self, node: &Node, index: u32, eye: Vec3, place: &Place) -> Sight {
         self.inner.sight(node, index, eye, place)
     }
 
+    #[inline]
     fn occlusion(&mut self, node: &Node, place: &Place) -> f32 {
         let inner = self.inner.occlusion(node, place);
         let hidden = self.occlusion.probability(place.to_world(node.center));

@@ -76,6 +76,7 @@ impl View {
 
     /// Whether there is a picture at all. From infinity, or with no field of view, nothing is
     /// seen: cuts are as coarse as they get, and nothing is drawn.
+    #[inline]
     pub fn sees(&self) -> bool {
         let angle = |tan: f32| tan > 0.0 && tan.is_finite();
         self.eye.is_finite()
@@ -120,7 +121,37 @@ impl Pyramid {
         let at = center - self.eye;
         let depth = at.dot(self.forward);
         let outside = |(axis, n): (Vec3, Vec2)| at.dot(axis).abs() * n.x - depth * n.y > radius;
-        depth > -radius && !outside(self.sides[0]) && !outside(self.sides[1])
+        // No branches: what is in the picture can't be foretold, and four spheres are tested at once.
+        (depth > -radius) & !outside(self.sides[0]) & !outside(self.sides[1])
+    }
+
+    /// Which of many spheres may be inside.
+    pub fn meets_all(&self, spheres: &Spheres, inside: &mut Vec<bool>) {
+        let [x, y, z, radius] = &spheres.0;
+        let count = radius.len();
+        inside.resize(count, false);
+        let (x, y, z, inside) = (&x[..count], &y[..count], &z[..count], &mut inside[..count]);
+        for i in 0..count {
+            inside[i] = self.meets(Vec3::new(x[i], y[i], z[i]), radius[i]);
+        }
+    }
+}
+
+/// Many spheres, each of their numbers in a list of its own: x, y, z of the centres, and radii.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Spheres([Vec<f32>; 4]);
+
+impl Spheres {
+    /// From centres and radii.
+    pub fn new(all: impl Iterator<Item = (Vec3, f32)>) -> Self {
+        let mut out = Self::default();
+        for (center, radius) in all {
+            let numbers = [center.x, center.y, center.z, radius];
+            for (list, number) in out.0.iter_mut().zip(numbers) {
+                list.push(number);
+            }
+        }
+        out
     }
 }
 

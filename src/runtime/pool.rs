@@ -1,4 +1,6 @@
-//! Many short lists that grow and shrink, in two long ones.
+//! Many short lists that grow and shrink, in a few long ones.
+
+use super::looking::List;
 
 /// Room for the nodes of every tree's cut. The first entry of tree `t` alone has a place of its own at `t`;
 /// longer lists live behind, in slots of a power of two, which are used again.
@@ -6,6 +8,7 @@
 pub(super) struct Pool {
     pub nodes: Vec<u32>,
     pub dues: Vec<f32>,
+    pub fades: Vec<f32>,
     /// Free slots by the logarithm of their room.
     free: [Vec<u32>; 32],
 }
@@ -28,6 +31,7 @@ impl Pool {
         let pool = Self {
             nodes: vec![0; trees],
             dues: vec![0.0; trees],
+            fades: vec![0.0; trees],
             // Lists of free slots never grow beyond this either.
             free: std::array::from_fn(|class| match class {
                 1..LARGEST => Vec::with_capacity(trees),
@@ -47,9 +51,19 @@ impl Pool {
         slot.start as usize..(slot.start + slot.len) as usize
     }
 
+    /// Nodes, dues and fades of a list.
+    #[inline]
+    pub fn list(&mut self, range: std::ops::Range<usize>) -> (&[u32], &mut [f32], &mut [f32]) {
+        (
+            &self.nodes[range.clone()],
+            &mut self.dues[range.clone()],
+            &mut self.fades[range],
+        )
+    }
+
     /// Replaces a tree's list.
-    pub fn replace(&mut self, tree: u32, slot: Slot, nodes: &[u32], dues: &[f32]) -> Slot {
-        let class = nodes.len().next_power_of_two().trailing_zeros() as u8;
+    pub fn replace(&mut self, tree: u32, slot: Slot, new: &List) -> Slot {
+        let class = new.nodes.len().next_power_of_two().trailing_zeros() as u8;
         // A little shrinking keeps the room: the list may grow again.
         let fits = class == slot.class || (class > 0 && class + 1 == slot.class);
         let mut slot = slot;
@@ -59,10 +73,11 @@ impl Pool {
             }
             slot = self.room(tree, class);
         }
-        slot.len = nodes.len() as u32;
+        slot.len = new.nodes.len() as u32;
         let range = Self::range(slot);
-        self.nodes[range.clone()].copy_from_slice(nodes);
-        self.dues[range].copy_from_slice(dues);
+        self.nodes[range.clone()].copy_from_slice(&new.nodes);
+        self.dues[range.clone()].copy_from_slice(&new.dues);
+        self.fades[range].copy_from_slice(&new.fades);
         slot
     }
 
@@ -84,6 +99,7 @@ impl Pool {
         let start = self.nodes.len();
         self.nodes.resize(start + (1 << class), 0);
         self.dues.resize(start + (1 << class), 0.0);
+        self.fades.resize(start + (1 << class), 0.0);
         slot(start as u32, class)
     }
 }
@@ -97,8 +113,12 @@ mod tests {
         let (mut pool, mut slots) = Pool::new(3);
         let list = |n: u32| (0..n).collect::<Vec<_>>();
         for (tree, n) in [(0u32, 5u32), (1, 6), (0, 1), (2, 7), (1, 3), (0, 9)] {
-            let dues = vec![tree as f32; n as usize];
-            slots[tree as usize] = pool.replace(tree, slots[tree as usize], &list(n), &dues);
+            let new = List {
+                nodes: list(n),
+                dues: vec![tree as f32; n as usize],
+                fades: vec![tree as f32; n as usize],
+            };
+            slots[tree as usize] = pool.replace(tree, slots[tree as usize], &new);
             for (other, &own) in slots.iter().enumerate() {
                 let range = Pool::range(own);
                 assert_eq!(pool.nodes[range.clone()], list(own.len));

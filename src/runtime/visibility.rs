@@ -45,6 +45,7 @@ pub trait Visibility {
 pub struct Plain;
 
 impl Visibility for Plain {
+    #[inline]
     fn sight(&mut self, node: &Node, _: u32, eye: Vec3, _: &Place) -> Sight {
         Sight {
             distance: node.center.distance(eye),
