@@ -275,8 +275,8 @@ fn children_are_drawn_until_their_parent_has_faded_in() {
             .collect()
     };
     assert_eq!(fades(60.0), [(0, 1.0)]);
-    assert_eq!(fades(45.0), [(0, 0.5), (1, 1.0), (2, 1.0)]);
-    assert_eq!(fades(40.1), [(0, 0.01), (1, 1.0), (2, 1.0)]);
+    assert_eq!(fades(45.0), [(1, 1.0), (2, 1.0), (0, 0.5)]);
+    assert_eq!(fades(40.1), [(1, 1.0), (2, 1.0), (0, 0.01)]);
     assert_eq!(fades(39.0), [(1, 1.0), (2, 1.0)]);
 }
 

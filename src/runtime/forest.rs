@@ -2,7 +2,7 @@
 
 use super::active_cut::{Changes, Clock};
 use super::hierarchy::Hierarchy;
-use super::looking::{First, List, Looking, collect_still, least};
+use super::looking::{First, List, Looking, collect_still, is_closed, least};
 use super::place::{Place, Pyramid, Spheres, View};
 use super::pool::{Pool, Slot};
 use super::visibility::Visibility;
@@ -31,7 +31,8 @@ pub struct Drawn {
 }
 
 /// Trees of a few species. For several threads, make one forest for each thread from a part of the
-/// trees: [`Visibility`] and cuts are then its own.
+/// trees, every second one for each of two, so that what is near is shared alike: [`Visibility`] and
+/// cuts are then its own.
 #[derive(Clone, Debug)]
 pub struct Forest<V> {
     species: Vec<Hierarchy>,
@@ -120,6 +121,19 @@ impl<V: Visibility> Forest<V> {
         let marks = (path, self.fade);
         let mut looking = Looking::new(hierarchy, &mut self.visibility, place, view, marks);
         let (nodes, dues, fades) = self.pool.list(range);
+        // Most trees are far and stay one billboard.
+        if let [root] = nodes
+            && is_closed(*root)
+            && let Some(due) = looking.closed()
+        {
+            (dues[0], fades[0]) = (due, f32::INFINITY);
+            (self.due[tree], self.fades[tree]) = (due, f32::INFINITY);
+            self.asked[tree] = looking.asked || (self.asked[tree] && !all);
+            return Changes {
+                looked_at: 1,
+                ..Changes::default()
+            };
+        }
         if !all && looking.still(nodes, dues, fades) {
             self.asked[tree] |= looking.asked;
             let looked_at = looking.looked_at;

@@ -42,6 +42,12 @@ impl List {
         self.fades.clear();
     }
 
+    fn copy(&mut self, nodes: &[u32], dues: &[f32], fades: &[f32]) {
+        self.nodes.extend_from_slice(nodes);
+        self.dues.extend_from_slice(dues);
+        self.fades.extend_from_slice(fades);
+    }
+
     #[inline]
     fn push(&mut self, node: u32, seen: Seen) {
         self.nodes.push(node | seen.state);
@@ -74,6 +80,9 @@ impl First {
 pub(super) fn least(numbers: &[f32]) -> f32 {
     const LANES: usize = 8;
     let smaller = |a: f32, b: f32| if b < a { b } else { a };
+    if numbers.len() < LANES {
+        return numbers.iter().fold(f32::INFINITY, |a, &b| smaller(a, b));
+    }
     let chunks = numbers.chunks_exact(LANES);
     let rest = chunks.remainder();
     let mut lanes = [f32::INFINITY; LANES];
@@ -186,6 +195,13 @@ impl<'a, V: Visibility> Looking<'a, V> {
         sight.distance / (seen * at.switch_distance * self.zoom.unwrap_or(0.0))
     }
 
+    /// Looks at a whole tree; the path at which it is due again if one billboard stands for it.
+    #[inline]
+    pub fn closed(&mut self) -> Option<f32> {
+        let seen = self.look(0);
+        (seen.state & OPEN == 0).then_some(seen.due)
+    }
+
     /// Looks again at the nodes of a list that are due; whether all are as they were.
     #[inline]
     pub fn still(&mut self, nodes: &[u32], dues: &mut [f32], fades: &mut [f32]) -> bool {
@@ -220,16 +236,17 @@ impl<'a, V: Visibility> Looking<'a, V> {
         let before = self.looked_at;
         let mut i = 0;
         while i < nodes.len() {
-            let (node, was_open) = (nodes[i] & INDEX, nodes[i] & OPEN != 0);
-            let seen = if all || dues[i] <= self.path {
-                self.look(node)
-            } else {
-                Seen {
-                    state: nodes[i] & !INDEX,
-                    due: dues[i],
-                    fades: fades[i],
+            if !all {
+                let due = dues[i..].iter().position(|due| *due <= self.path);
+                let end = due.map_or(nodes.len(), |due| i + due);
+                new.copy(&nodes[i..end], &dues[i..end], &fades[i..end]);
+                i = end;
+                if i == nodes.len() {
+                    break;
                 }
-            };
+            }
+            let (node, was_open) = (nodes[i] & INDEX, nodes[i] & OPEN != 0);
+            let seen = self.look(node);
             let open = seen.state & OPEN != 0;
             new.push(node, seen);
             i += 1;
@@ -264,10 +281,10 @@ impl<'a, V: Visibility> Looking<'a, V> {
         }
     }
 
-    /// Writes what is drawn of a list in which nodes fade.
+    /// Writes what is drawn of a list in which nodes fade: first what is drawn in full.
     pub fn collect(&mut self, tree: u32, nodes: &[u32], fades: &[f32], out: &mut Vec<Drawn>) {
+        collect_still(tree, nodes, out);
         for (&node, &fades) in nodes.iter().zip(fades) {
-            out.extend(whole(tree, node));
             if fades < self.path {
                 let share = (self.nearness(node & INDEX) - (1.0 - self.fade)) / self.fade;
                 if share > 0.0 {
@@ -283,28 +300,22 @@ impl<'a, V: Visibility> Looking<'a, V> {
     }
 }
 
-/// What is drawn in full for an entry of a list: a billboard for what is closed, geometry for an open tip.
+/// Whether an entry of a list is closed.
 #[inline]
-fn whole(tree: u32, entry: u32) -> Option<Drawn> {
-    let drawn = entry & OPEN == 0 || entry & TIP != 0;
-    drawn.then_some(Drawn {
-        tree,
-        node: entry & INDEX,
-        form: form(entry),
-        fade: 1.0,
-    })
+pub(super) fn is_closed(entry: u32) -> bool {
+    entry & OPEN == 0
 }
 
 #[inline]
 fn form(entry: u32) -> Form {
-    if entry & OPEN == 0 {
+    if is_closed(entry) {
         Form::Billboard
     } else {
         Form::Geometry
     }
 }
 
-/// Writes what is drawn of a list in which no node fades.
+/// Writes what is drawn in full of a list: billboards for what is closed, geometry for open tips.
 #[inline]
 pub(super) fn collect_still(tree: u32, nodes: &[u32], out: &mut Vec<Drawn>) {
     // Written first and counted after: whether an entry is drawn can't be foretold.

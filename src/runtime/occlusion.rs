@@ -152,13 +152,15 @@ fn walk(cells: &Cells, from: IVec3, to: IVec3, law: Law, clumping: f32) -> f32 {
             hidden.clamp(0.0, 1.0)
         }
         Law::Beer => {
+            // What is behind so much is hidden but for less than f32 can tell from all.
+            let enough = 17.5 / clumping;
             let mut depth = 0.0f32;
             crossings.each(|cell, share, last| {
                 let extinction = cells.extinction().get(cell).copied().unwrap_or(0.0);
                 if !last && extinction > 0.0 {
                     depth += extinction * (portion * share) as f32;
                 }
-                depth < f32::INFINITY
+                depth < enough
             });
             (1.0 - (-depth * clumping).exp()).clamp(0.0, 1.0)
         }
@@ -170,11 +172,10 @@ fn walk(cells: &Cells, from: IVec3, to: IVec3, law: Law, clumping: f32) -> f32 {
 /// Crossing number k of an axis lies at the share (2 k + 1) / (2 steps) of the way. Shares are
 /// compared as whole numbers, over the common denominator: ties at corners are ties.
 struct Crossings {
-    /// Cell, and how far the next one along each axis is in the list of cells.
-    cell: usize,
-    stride: [isize; 3],
-    /// Crossings that are still to come.
-    left: [i32; 3],
+    /// Cell, the last one, and how far the next one along each axis is in the list of cells.
+    cell: i64,
+    last: i64,
+    stride: [i64; 3],
     /// The next crossing of each axis, and how far apart they are, over the denominator.
     next: [i64; 3],
     apart: [i64; 3],
@@ -199,13 +200,13 @@ impl Crossings {
             let past = (enter * f64::from(steps[axis]) + 0.5 + ROUNDING).floor() as i32;
             taken[axis] = past.clamp(0, steps[axis]);
         }
-        let (first, size) = (from + way.signum() * taken, cells.count());
-        let index = (first.z * size.y + first.y) * size.x + first.x;
+        let size = cells.count();
         let stride = [1, size.x, size.x * size.y];
+        let index = |cell: IVec3| i64::from(cell.dot(IVec3::from(stride)));
         Self {
-            cell: index.max(0) as usize,
-            stride: [0, 1, 2].map(|axis| (stride[axis] * way[axis].signum()) as isize),
-            left: [0, 1, 2].map(|axis| steps[axis] - taken[axis]),
+            cell: index(from + way.signum() * taken),
+            last: index(from + way),
+            stride: [0, 1, 2].map(|axis| i64::from(stride[axis] * way[axis].signum())),
             next: [0, 1, 2].map(|axis| match steps[axis] {
                 0 => i64::MAX,
                 _ => (2 * i64::from(taken[axis]) + 1) * others[axis],
@@ -223,18 +224,18 @@ impl Crossings {
         let mut at = self.enter;
         loop {
             let end = self.next[0].min(self.next[1]).min(self.next[2]);
-            let last = self.left == [0; 3];
+            // Rounding may miss a last cell at the grid's edge, but not the end of the way.
+            let last = self.cell == self.last || end >= self.denominator;
             let share = if last { 1.0 } else { end as f64 * unit };
-            if !act(self.cell, (share - at).max(0.0), last) || last {
+            if !act(self.cell as usize, (share - at).max(0.0), last) || last {
                 return;
             }
             at = share;
+            // Without branches: which axis is crossed next can't be foretold.
             for axis in 0..3 {
-                if self.next[axis] <= end {
-                    self.cell = self.cell.wrapping_add_signed(self.stride[axis]);
-                    self.left[axis] -= 1;
-                    self.next[axis] += self.apart[axis];
-                }
+                let crossed = -i64::from(self.next[axis] <= end);
+                self.cell += self.stride[axis] & crossed;
+                self.next[axis] += self.apart[axis] & crossed;
             }
         }
     }
