@@ -8,6 +8,7 @@ use crate::cloud::coverage::{coverage, epsilon};
 use crate::cloud::foliage::{Face, Foliage};
 use crate::cloud::occlusion::Occlusion;
 use crate::detail::element::Element;
+use crate::detail::likeness::representatives;
 use crate::detail::optimal_distance::{Aspect, Own, aspects};
 use crate::export::chart::Chart;
 use crate::export::foliage::CardGroup;
@@ -72,7 +73,7 @@ impl<'a> Describer<'a> {
             optimal_distance_m: metres(own.optimal_distance),
             geometric_distance_m: metres(own.geometric_distance),
         };
-        let describe = |(s, aspect): (&tree::Subtree, Aspect)| Subtree {
+        let describe = |((s, aspect), representative): ((&tree::Subtree, Aspect), u32)| Subtree {
             parent: s.parent,
             children: s.children.clone(),
             order: s.order,
@@ -84,6 +85,7 @@ impl<'a> Describer<'a> {
             geometric_distance_m: metres(aspect.geometric_distance),
             branch: aspect.branch.to_array(),
             density: aspect.density,
+            representative,
             own: aspect.own.map(own),
         };
         let aspects = aspects(self.tree, self.scene.focal_px());
@@ -91,6 +93,7 @@ impl<'a> Describer<'a> {
             .subtrees
             .iter()
             .zip(aspects)
+            .zip(representatives(self.tree))
             .map(describe)
             .collect()
     }

@@ -50,6 +50,8 @@ pub mod report;
 pub mod runtime;
 #[cfg(feature = "bake")]
 pub mod scene;
+#[cfg(feature = "bake")]
+mod seen;
 pub mod space;
 #[cfg(feature = "bake")]
 pub mod study;

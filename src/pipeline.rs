@@ -19,7 +19,7 @@ use crate::error::{Error, Result};
 use crate::export::combined::{Packed, extras, write_combined};
 use crate::export::gltf::write_glb;
 use crate::export::manifest::{
-    self, FORMAT, Manifest, Provenance, Range, Reference, SUFFIX, VERSION,
+    self, FORMAT, Manifest, Provenance, Range, Reference, SUFFIX, VERSION, Visibility,
 };
 use crate::export::original::Original;
 use crate::export::package::{Package, remove_beside};
@@ -33,6 +33,7 @@ use crate::recipe::{Method, Recipe};
 use crate::report::schema::Report;
 use crate::report::{Judged, Settings, heights, judge};
 use crate::scene::Scene;
+use crate::seen::measure_subtrees;
 use crate::space::sha256::sha256;
 use crate::verdict::{REFUSED, in_band, refusal};
 use crate::watch::{Deadline, Watch, begin, part, step};
@@ -134,6 +135,10 @@ fn made(request: &Request, watch: &dyn Watch) -> Result<Baked> {
         )?),
         false => None,
     };
+    let visibility = match request.recipe.hierarchy {
+        true => Some(Visibility::of(&measure_subtrees(&tree, watch)?)),
+        false => None,
+    };
     let judged = read_back(&package, &packed[1..], &rungs)?;
     begin(watch, "measure", heights(&judged).len() as u64)?;
     let report = Report {
@@ -154,6 +159,7 @@ fn made(request: &Request, watch: &dyn Watch) -> Result<Baked> {
     let manifest = Manifest {
         provenance,
         files: files.clone(),
+        visibility,
         tiles,
         ..levels
     };

@@ -11,7 +11,7 @@ use pleach::export::manifest_tiles::Tiles;
 use pleach::pipeline::{Baked, Request, Wanted, bake};
 use pleach::recipe::Recipe;
 use pleach::report::Reference;
-use pleach::runtime::{Forest, Form, Place, Plain, View};
+use pleach::runtime::{ActiveCut, Drawn, Forest, Form, Place, Plain, Shown, View};
 use pleach::scene::Scene;
 use pleach::space::raster::Sampling;
 use pleach::space::view::views;
@@ -322,4 +322,42 @@ fn a_manifest_with_flawed_tiles_is_refused_by_field() {
         let error = Manifest::from_ron(&text, Path::new("x")).unwrap_err();
         assert!(error.to_string().contains(field), "{field}: {error}");
     }
+}
+
+#[test]
+fn the_manifest_tells_what_every_sub_tree_shows() {
+    let (out, _) = small();
+    let (manifest, _) = manifest(out, "oak");
+    let measured = manifest.measured().unwrap().unwrap();
+    let count = manifest.subtrees.len();
+    assert_eq!(measured.bytes().len(), 36 * count);
+    // All that the whole tree has it shows; of its branches some is hidden.
+    assert!(measured.bytes()[..36].iter().all(|&share| share >= 250));
+    let others = &measured.bytes()[36..];
+    let mean = others.iter().map(|&b| f64::from(b)).sum::<f64>() / others.len() as f64;
+    assert!((50.0..250.0).contains(&mean), "{mean}");
+    // A cut that knows it draws less geometry than one by distance, from where some is hidden.
+    let hierarchy = manifest.hierarchy().unwrap();
+    let shown = Shown::new(vec![(&hierarchy, measured)]);
+    let eye = Vec3::from_array(manifest.tree.center.map(|c| c as f32)) + Vec3::X * 12.0;
+    let view = View::looking(eye, Vec3::NEG_X, 1.0, 1.0);
+    let geometry = |drawn: Vec<Drawn>| drawn.iter().filter(|d| d.form == Form::Geometry).count();
+    let place = Place::at(Vec3::ZERO);
+    let mut plain = ActiveCut::new(hierarchy.clone(), place, Plain);
+    let mut seen = ActiveCut::new(hierarchy.clone(), place, shown);
+    let (mut all, mut some) = (Vec::new(), Vec::new());
+    plain.update(&view);
+    plain.collect(&view, &mut all);
+    seen.update(&view);
+    seen.collect(&view, &mut some);
+    let (all, some) = (geometry(all), geometry(some));
+    assert!(0 < some && some < all, "{some} of {all}");
+    // Sub-trees that are like others name the first of them.
+    let first = manifest
+        .subtrees
+        .iter()
+        .zip(0..)
+        .filter(|(s, i)| s.representative == *i);
+    let first = first.count();
+    assert!(0 < first && first < count, "{first} of {count}");
 }

@@ -9,7 +9,7 @@ use pleach::botany::tree::Tree;
 use pleach::describe::Describer;
 use pleach::detail::element::elements;
 use pleach::detail::optimal_distance::{TEXELS, aspects};
-use pleach::export::manifest::{FORMAT, Manifest, VERSION};
+use pleach::export::manifest::{FORMAT, Manifest, VERSION, Visibility};
 use pleach::runtime::{Density, Form, Hidden, Law, Occlusion, Plain};
 use pleach::scene::Scene;
 use pleach::study::lee;
@@ -92,7 +92,7 @@ fn a_spoiled_manifest_is_refused_by_its_field() {
         spoil(&mut bad);
         refusal(&bad.to_ron().unwrap())
     };
-    let message = refusal(&text.replacen("version: 2", "version: 1", 1));
+    let message = refusal(&text.replacen("version: 3", "version: 1", 1));
     assert!(
         message.contains("version") && message.contains('1'),
         "{message}"
@@ -103,7 +103,22 @@ fn a_spoiled_manifest_is_refused_by_its_field() {
     }
     let last = good.subtrees.len() - 1;
     type Spoil<'a> = (&'a str, &'a dyn Fn(&mut Manifest));
-    let cases: [Spoil; 9] = [
+    let cases: [Spoil; 12] = [
+        ("representative", &|m| {
+            m.subtrees[0].representative = 1;
+        }),
+        ("visibility.shares", &|m| {
+            m.visibility = Some(Visibility {
+                side: 6,
+                shares: "AAAA".into(),
+            });
+        }),
+        ("visibility.shares", &|m| {
+            m.visibility = Some(Visibility {
+                side: 0,
+                shares: "!".into(),
+            });
+        }),
         ("radius_m", &|m| m.subtrees[last].radius_m = f32::NAN),
         ("connector", &|m| m.subtrees[1].connector[2] = f32::INFINITY),
         ("optimal_distance_m", &|m| {

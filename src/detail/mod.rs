@@ -4,6 +4,7 @@ pub mod adapt;
 pub mod adaptive_level;
 pub mod element;
 pub mod level;
+pub mod likeness;
 pub mod merge;
 pub mod opaque;
 pub mod optimal_cut;

@@ -6,13 +6,15 @@
 
 use std::path::Path;
 
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use super::manifest_tiles::Tiles;
 use crate::error::{Error, Result};
 use crate::recipe::Recipe;
-use crate::runtime::{self, Hierarchy, OwnLeaves};
+use crate::runtime::{self, Hierarchy, Measured, OwnLeaves};
 use crate::scene::Scene;
 
 /// What a manifest's name ends with.
@@ -20,7 +22,7 @@ pub const SUFFIX: &str = ".pleach.ron";
 /// What [`Manifest::format`] says.
 pub const FORMAT: &str = "pleach";
 /// Version of this form.
-pub const VERSION: u32 = 2;
+pub const VERSION: u32 = 3;
 
 /// The whole manifest.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -45,6 +47,9 @@ pub struct Manifest {
     pub subtree_texels: u32,
     /// The hierarchy of sub-trees: parents before children; 0 is the whole tree.
     pub subtrees: Vec<Subtree>,
+    /// How much of each sub-tree is seen; only with `--hierarchy`.
+    #[serde(default)]
+    pub visibility: Option<Visibility>,
     /// The hierarchy as it is written, by `--hierarchy`.
     #[serde(default)]
     pub tiles: Option<Tiles>,
@@ -193,9 +198,22 @@ pub struct Subtree {
     pub branch: [f32; 3],
     /// Density of that branch's siblings, 0 (alone) to 1 (what is behind them is hidden).
     pub density: f32,
+    /// The first sub-tree that is like it by Deng's criterion (same order and levels, leaves and children within a
+    /// tenth): an engine that makes textures of its own may draw it with that one's. Its own index where it is the
+    /// first; files of the package don't rest on it.
+    pub representative: u32,
     /// What grows on its own branch, leaves and wood; `None` where it carries no other branches:
     /// then that is all of it.
     pub own: Option<Own>,
+}
+
+/// Measured visibility: for each sub-tree the share of its pixels that the whole tree shows.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Visibility {
+    /// Directions along an edge of the octahedral map over the sphere ([`Measured`]).
+    pub side: u32,
+    /// `side * side` bytes a sub-tree in the order of [`Manifest::subtrees`], 255 for all of it; base64.
+    pub shares: String,
 }
 
 /// What grows on a sub-tree's own branch.
@@ -290,6 +308,21 @@ impl Manifest {
         })
     }
 
+    /// What was measured of every sub-tree, by its index; `None` where nothing was.
+    ///
+    /// # Errors
+    /// [`Error::Internal`]: what [`Manifest::from_ron`] has read has no flaw.
+    pub fn measured(&self) -> Result<Option<Measured>> {
+        let Some(visibility) = &self.visibility else {
+            return Ok(None);
+        };
+        let measured = visibility.measured(self.subtrees.len());
+        measured.map(Some).map_err(|what| Error::Internal {
+            step: "read visibility",
+            what,
+        })
+    }
+
     /// The files that a manifest of any version lists; `None` where it is none of ours.
     pub fn files_of(file: &Path) -> Option<Vec<String>> {
         #[derive(Deserialize)]
@@ -301,5 +334,28 @@ impl Manifest {
         // A name is a file in this folder, never a path out of it.
         let plain = |n: &String| !n.contains(['/', '\\']) && n != "..";
         (owned.format == FORMAT).then(|| owned.files.into_iter().filter(plain).collect())
+    }
+}
+
+impl Visibility {
+    /// In the form that is kept.
+    pub fn of(measured: &Measured) -> Self {
+        Self {
+            side: measured.side(),
+            shares: STANDARD.encode(measured.bytes()),
+        }
+    }
+
+    /// What can be looked up, for so many sub-trees; or what is wrong with `shares`.
+    pub(super) fn measured(&self, subtrees: usize) -> std::result::Result<Measured, String> {
+        let bytes = STANDARD.decode(&self.shares);
+        let bytes = bytes.map_err(|e| format!("it is not base64: {e}"))?;
+        let (side, found) = (self.side as usize, bytes.len());
+        let wrong =
+            || format!("{found} bytes are not {side} x {side} for each of {subtrees} sub-trees");
+        if Some(found) != side.checked_mul(side).and_then(|n| n.checked_mul(subtrees)) {
+            return Err(wrong());
+        }
+        Measured::from_bytes(self.side, bytes).ok_or_else(wrong)
     }
 }

@@ -24,6 +24,15 @@ pub(super) fn flaw(manifest: &Manifest) -> Option<(String, String)> {
             subtrees
                 .find_map(|(i, s)| of_numbers(i, s).or_else(|| of_links(i, s, &manifest.subtrees)))
         })
+        .or_else(|| {
+            let measured = manifest
+                .visibility
+                .as_ref()?
+                .measured(manifest.subtrees.len());
+            measured
+                .err()
+                .map(|what| ("visibility.shares".into(), what))
+        })
         .or_else(|| manifest.tiles.as_ref()?.flaw(manifest.subtrees.len()))
         .or_else(|| {
             let none = manifest.subtrees.is_empty();
@@ -169,6 +178,13 @@ fn of_links(index: usize, s: &Subtree, all: &[Subtree]) -> Option<(String, Strin
             ));
         }
         _ => {}
+    }
+    let first = all.get(s.representative as usize);
+    if s.representative as usize > index
+        || first.is_none_or(|f| f.representative != s.representative)
+    {
+        let what = format!("sub-tree {} is not the first of its kind", s.representative);
+        return Some((at("representative"), what));
     }
     let mut carried = 0u64;
     for &child in &s.children {

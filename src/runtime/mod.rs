@@ -10,6 +10,7 @@
 //!                Plain      distance alone
 //!                Density    Deng: rear branches of a dense crown count as farther off
 //!                Hidden     El-Sana: what the cells of a grid hide counts less
+//!                Shown      ours: what was measured to be hidden by its own tree counts less
 //! Measured     ours: pixels counted beforehand from directions over the sphere
 //! ActiveCut    follows the camera through one tree by splits and merges
 //! Forest       the same for many trees; most of them cost one comparison a frame
@@ -49,6 +50,7 @@ mod measured;
 mod occlusion;
 mod place;
 mod pool;
+mod shown;
 mod solidity;
 mod visibility;
 
@@ -61,5 +63,6 @@ pub use hierarchy::{Flaw, Hierarchy, Node, Origin, OwnLeaves, Subtree};
 pub use measured::{Measured, Measuring};
 pub use occlusion::{Hidden, Law, Occlusion, blend};
 pub use place::{Place, View};
+pub use shown::Shown;
 pub use solidity::{by_faces, by_rays, splat};
 pub use visibility::{Plain, Sight, Visibility};

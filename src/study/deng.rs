@@ -18,6 +18,7 @@ use super::scenes::{
 };
 use super::species::Species;
 use super::stand::{Cost, Stand, Walk};
+use crate::detail::likeness::representatives;
 use crate::error::Result;
 use crate::report::agreement;
 use crate::runtime::{Cells, Density, DotProduct, Hidden, Law, Occlusion, Plain, View};
@@ -56,10 +57,44 @@ pub struct Row {
     pub right_tree: f64,
 }
 
+/// Textures of all sub-trees of a tree, and of those that stand for all (Deng, "Memory Strategy").
+#[derive(Clone, Debug)]
+pub struct Memory {
+    /// The tree.
+    pub name: String,
+    /// Sub-trees, and those that represent them.
+    pub subtrees: [usize; 2],
+    /// RGBA with mips, of all and of those.
+    pub bytes: [u64; 2],
+}
+
+impl Memory {
+    fn of(species: &Species) -> Self {
+        let first = representatives(&species.tree);
+        let (mut subtrees, mut bytes) = ([first.len(), 0], [0; 2]);
+        subtrees[1] = (0..).zip(&first).filter(|(i, first)| i == *first).count();
+        for (origin, looks) in species.hierarchy.origins().iter().zip(&species.looks) {
+            let texels: u64 = looks.billboards.iter().map(|b| b.texels).sum();
+            let own = texels * 4 * 4 / 3;
+            bytes[0] += own;
+            if first[origin.subtree as usize] == origin.subtree {
+                bytes[1] += own;
+            }
+        }
+        Self {
+            name: species.tree.model.name.clone(),
+            subtrees,
+            bytes,
+        }
+    }
+}
+
 /// The whole study.
 pub struct Study {
     /// Name, trees and rows of each scene.
     pub scenes: Vec<(String, usize, Vec<Row>)>,
+    /// Textures of each tree's sub-trees: the tree, then the forest's species.
+    pub memory: Vec<Memory>,
     sheet: Sheet,
 }
 
@@ -70,12 +105,14 @@ pub struct Study {
 pub fn study(tree: Species, settings: &Settings) -> Result<Study> {
     let name = tree.tree.model.name.clone();
     let place = stand_at(&tree.tree, glam::Vec2::ZERO, 0.0, 1.0, 0);
+    let mut memory = vec![Memory::of(&tree)];
     let alone = [tree];
     let cells = tree_cells(&alone[0], &place, TREE_CELLS, None);
     let path = approach(&place, settings.frames);
     let stand = Stand::new(&alone, vec![place]);
     let (one, _) = rows(&stand, &cells, &path, settings);
     let species = five_species()?;
+    memory.extend(species.iter().map(Memory::of));
     let places = forest(&species, TREES);
     let cells = forest_cells(&species, &places, CELL_M, None);
     let stand = Stand::new(&species, places);
@@ -85,6 +122,7 @@ pub fn study(tree: Species, settings: &Settings) -> Result<Study> {
             (name, 1, one),
             ("forest of five species".into(), TREES, many),
         ],
+        memory,
         sheet: Sheet::column(&frames),
     })
 }
@@ -171,7 +209,16 @@ impl Study {
             })
         };
         let scene = |(name, trees, rows): &(String, usize, Vec<Row>)| json!({ "scene": name, "trees": trees, "ways": rows.iter().map(|r| row(r, &rows[0])).collect::<Vec<_>>() });
-        json!({ "scenes": self.scenes.iter().map(scene).collect::<Vec<_>>() })
+        let memory = |m: &Memory| {
+            json!({
+                "tree": m.name, "subtrees": m.subtrees[0], "representatives": m.subtrees[1],
+                "texture_bytes": m.bytes[0], "texture_bytes_shared": m.bytes[1],
+            })
+        };
+        json!({
+            "scenes": self.scenes.iter().map(scene).collect::<Vec<_>>(),
+            "textures": self.memory.iter().map(memory).collect::<Vec<_>>(),
+        })
     }
 
     /// The figures for people.
@@ -205,6 +252,18 @@ impl Study {
                 );
             }
             out += "\n";
+        }
+        out += &format!(
+            "{:<22}{:>12}{:>16}{:>14}{:>14}\n",
+            "textures of sub-trees", "sub-trees", "representatives", "all, MB", "shared, MB"
+        );
+        for m in &self.memory {
+            let [all, shared] = m.bytes.map(|b| b as f64 / 1e6);
+            let [subtrees, representatives] = m.subtrees;
+            out += &format!(
+                "{:<22}{subtrees:>12}{representatives:>16}{all:>14.1}{shared:>14.1}\n",
+                m.name
+            );
         }
         out
     }
