@@ -3,7 +3,7 @@
 //! An item buffer of the whole tree tells how many pixels each sub-tree shows; drawn alone at the same
 //! scale it shows how many it has. The share of the two is what the others leave of it.
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
 use crate::botany::tree::Tree;
@@ -14,17 +14,17 @@ use crate::runtime::{Measured, Measuring};
 use crate::space::raster::{Camera, EMPTY, Geometry, Mips, Sampling, Scene, draw};
 use crate::watch::{Watch, begin, step};
 
-/// Directions along an edge of the octahedral map: 36 in all.
-const SIDE: u32 = 6;
+/// Directions along an edge of the octahedral map: 25 in all.
+const SIDE: u32 = 5;
 /// Pixels of the bounding sphere's diameter in an item buffer.
-const DIAMETER_PX: f32 = 512.0;
+const DIAMETER_PX: f32 = 256.0;
 /// One sample a pixel, from the full texture.
 const ONCE: Sampling = Sampling {
     side: 1,
     mips: Mips::Base,
 };
 
-/// Share of each sub-tree's own pixels (its own silhouette, drawn alone) that the whole tree shows, 0 to 1, from 36
+/// Share of each sub-tree's own pixels (its own silhouette, drawn alone) that the whole tree shows, 0 to 1, from 25
 /// directions.
 ///
 /// # Errors
@@ -49,8 +49,13 @@ pub fn measure_subtrees(tree: &Tree, watch: &dyn Watch) -> Result<Measured> {
     Ok(measuring.finish())
 }
 
-/// The triangles in the order of a walk over the sub-trees, so that each sub-tree is a range of them.
+/// The triangles in the order of a walk over the sub-trees, so that each sub-tree is a range of them. Each has
+/// corners of its own, so that a sub-tree is drawn without touching those of the others.
+#[derive(Default)]
 struct Walk {
+    positions: Vec<Vec3>,
+    uvs: [Vec<Vec2>; 2],
+    colors: Vec<[f32; 4]>,
     triangles: Vec<[u32; 3]>,
     materials: Vec<u32>,
     /// For each triangle the sub-tree that it grows on.
@@ -62,13 +67,9 @@ struct Walk {
 impl Walk {
     fn new(tree: &Tree, drawable: &Drawable) -> Self {
         let own = own_triangles(tree);
-        let scene = drawable.scene();
-        let count = tree.model.triangles.len();
         let mut out = Self {
-            triangles: Vec::with_capacity(count),
-            materials: Vec::with_capacity(count),
-            owner: Vec::with_capacity(count),
             ranges: vec![0..0; tree.subtrees.len()],
+            ..Self::default()
         };
         // `None` closes the sub-tree that was opened last.
         let (mut stack, mut open) = (vec![Some(0u32)], Vec::new());
@@ -82,9 +83,7 @@ impl Walk {
             stack.push(None);
             out.ranges[subtree as usize].start = out.triangles.len();
             for &t in &own[subtree as usize] {
-                out.triangles.push(tree.model.triangles[t as usize]);
-                out.materials
-                    .push(scene.geometry.triangle_material[t as usize]);
+                out.push(&drawable.scene().geometry, t as usize);
                 out.owner.push(subtree);
             }
             let children = &tree.subtrees[subtree as usize].children;
@@ -93,12 +92,29 @@ impl Walk {
         out
     }
 
+    fn push(&mut self, all: &Geometry, triangle: usize) {
+        let corner = self.positions.len() as u32;
+        self.triangles.push([corner, corner + 1, corner + 2]);
+        self.materials.push(all.triangle_material[triangle]);
+        for i in all.triangles[triangle].map(|i| i as usize) {
+            self.positions.push(all.positions[i]);
+            self.colors.extend(all.colors.get(i));
+            for (list, uvs) in self.uvs.iter_mut().zip(all.uvs) {
+                list.extend(uvs.get(i));
+            }
+        }
+    }
+
     fn scene<'a>(&'a self, all: &Scene<'a>, range: std::ops::Range<usize>) -> Scene<'a> {
+        let corners = 3 * range.start..3 * range.end;
         Scene {
             geometry: Geometry {
-                triangles: &self.triangles[range.clone()],
+                positions: &self.positions[corners.clone()],
+                normals: &[],
+                uvs: [0, 1].map(|set| self.uvs[set].get(corners.clone()).unwrap_or(&[])),
+                colors: self.colors.get(corners).unwrap_or(&[]),
+                triangles: &self.triangles[..range.len()],
                 triangle_material: &self.materials[range],
-                ..all.geometry
             },
             materials: all.materials,
             textures: all.textures,

@@ -330,10 +330,10 @@ fn the_manifest_tells_what_every_sub_tree_shows() {
     let (manifest, _) = manifest(out, "oak");
     let measured = manifest.measured().unwrap().unwrap();
     let count = manifest.subtrees.len();
-    assert_eq!(measured.bytes().len(), 36 * count);
+    assert_eq!(measured.bytes().len(), 25 * count);
     // All that the whole tree has it shows; of its branches some is hidden.
-    assert!(measured.bytes()[..36].iter().all(|&share| share >= 250));
-    let others = &measured.bytes()[36..];
+    assert!(measured.bytes()[..25].iter().all(|&share| share >= 250));
+    let others = &measured.bytes()[25..];
     let mean = others.iter().map(|&b| f64::from(b)).sum::<f64>() / others.len() as f64;
     assert!((50.0..250.0).contains(&mean), "{mean}");
     // A cut that knows it draws less geometry than one by distance, from where some is hidden.
