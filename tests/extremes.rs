@@ -305,3 +305,80 @@ fn budgets_too_small_for_any_tree_and_endless_distances_say_what_is_possible() {
         assert!(!home.path().join("out").exists());
     }
 }
+
+/// `cargo test --release --test extremes -- --ignored`
+#[test]
+#[ignore = "takes minutes"]
+fn a_million_separate_triangles_are_baked() {
+    let (mut points, mut triangles) = (Vec::new(), Vec::new());
+    for i in 0..1_000_000u32 {
+        let center = ball(i);
+        let some = |k| Vec3::new(random(i, k), random(i, k + 1), random(i, k + 2)) * 0.04;
+        points.extend([4, 7, 10].map(|k| center + some(k)));
+        triangles.push([3 * i, 3 * i + 1, 3 * i + 2]);
+    }
+    let parts = [("bark", trunk()), ("leaf", (points, triangles))];
+    let report = bake(&parts, &["--triangles", "1%,24"]);
+    let f1: Vec<f64> = report.levels.iter().map(|l| l.sizes[0].f1.mean).collect();
+    assert!(f1.len() == 2 && f1[0] > 0.9, "{f1:?}");
+}
+
+/// One leaf under a texture of so many texels a side, opaque in the middle.
+fn textured(file: &Path, side: u32) {
+    let mut png = std::io::Cursor::new(Vec::new());
+    image::GrayAlphaImage::from_fn(side, side, |x, y| {
+        let inside = |at: u32| side < 3 || (at > side / 4 && at < side - side / 4);
+        image::LumaA([90, if inside(x) && inside(y) { 255 } else { 0 }])
+    })
+    .write_to(&mut png, image::ImageFormat::Png)
+    .unwrap();
+    let (points, triangles) = leaves(60, 0.4, ball, false);
+    let corners = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)];
+    let uvs: Vec<glam::Vec2> = (0..points.len()).map(|i| corners[i % 4].into()).collect();
+    let mut glb = GlbBuilder::default();
+    let attributes = json!({ "POSITION": glb.positions(&points), "TEXCOORD_0": glb.vec2(&uvs) });
+    let indices = glb.indices(&triangles, points.len());
+    let view = glb.view(png.get_ref(), None);
+    let material = json!({
+        "name": "leaf", "doubleSided": true, "alphaMode": "MASK",
+        "pbrMetallicRoughness": { "baseColorTexture": { "index": 0 } },
+    });
+    let root = json!({
+        "asset": { "version": "2.0" }, "scene": 0, "scenes": [{ "nodes": [0] }],
+        "nodes": [{ "mesh": 0 }], "materials": [material], "textures": [{ "source": 0 }],
+        "meshes": [{ "primitives": [{ "attributes": attributes, "indices": indices, "material": 0 }] }],
+        "images": [{ "bufferView": view, "mimeType": "image/png" }],
+    });
+    std::fs::write(file, glb.finish(root)).unwrap();
+}
+
+/// F1 of the levels of a tree under a texture of so many texels a side.
+fn under_texture(side: u32) -> Vec<f64> {
+    let home = tempfile::tempdir().unwrap();
+    textured(&home.path().join("t.glb"), side);
+    std::fs::write(home.path().join("s.ron"), "(first_height_px: 64)").unwrap();
+    let done = Command::new(env!("CARGO_BIN_EXE_pleach"))
+        .args(["bake", "t.glb", "-o", "out", "--preset", "draft", "--json"])
+        .args(["--scene", "s.ron", "--triangles", "60,24"])
+        .current_dir(home.path())
+        .output()
+        .unwrap();
+    let message = String::from_utf8_lossy(&done.stderr).into_owned();
+    assert!(done.status.success(), "{message}");
+    let report: Report = serde_json::from_slice(&done.stdout).unwrap();
+    report.levels.iter().map(|l| l.sizes[0].f1.mean).collect()
+}
+
+#[test]
+fn a_texture_of_one_texel_is_a_colour() {
+    let f1 = under_texture(1);
+    assert!(f1.len() == 2 && f1[0] > 0.9, "{f1:?}");
+}
+
+/// `cargo test --release --test extremes -- --ignored`
+#[test]
+#[ignore = "takes a gigabyte"]
+fn a_texture_of_16384_texels_a_side_is_baked() {
+    let f1 = under_texture(16_384);
+    assert!(f1.len() == 2 && f1[0] > 0.9, "{f1:?}");
+}

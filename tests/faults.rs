@@ -259,3 +259,92 @@ fn names_with_spaces_quotes_and_other_letters_are_names() {
     assert_eq!(done.status.code(), Some(2), "{message}");
     assert!(message.contains("rename it") && !home.path().join("never").exists());
 }
+
+#[test]
+fn a_reader_that_goes_away_is_no_fault() {
+    let (home, tree) = home();
+    let (tree, again) = (tree.to_str().unwrap(), home.path().join("again.glb"));
+    let again = again.to_str().unwrap();
+    let commands: [&[&str]; 5] = [
+        &["inspect", tree],
+        &["inspect", tree, "--json"],
+        &["grow", "palm", "--leaves", "40", "-o", again],
+        &["grow", "palm", "--leaves", "40", "-o", again, "--json"],
+        &["evaluate", tree, tree, "--height", "32", "--views", "4"],
+    ];
+    for command in commands {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_pleach"))
+            .args(command)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        drop(child.stdout.take());
+        let done = child.wait_with_output().unwrap();
+        let message = String::from_utf8(done.stderr).unwrap();
+        assert_eq!(done.status.code(), Some(0), "{command:?}: {message}");
+        assert!(!message.contains("panicked"), "{message}");
+    }
+    // Where not even errors can be written, the exit code still tells.
+    let mut child = Command::new(env!("CARGO_BIN_EXE_pleach"))
+        .args(["inspect", "no such file.glb"])
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(child.stderr.take());
+    assert_eq!(child.wait().unwrap().code(), Some(2));
+}
+
+#[test]
+fn an_input_that_changes_while_it_is_read_is_one_of_its_versions_or_an_error() {
+    use std::sync::atomic::{AtomicBool, Ordering};
+    let (home, tree) = home();
+    let one = std::fs::read(&tree).unwrap();
+    let grown = Command::new(env!("CARGO_BIN_EXE_pleach"))
+        .args(["grow", "palm", "--leaves", "30", "--seed", "7", "-q", "-o"])
+        .arg(&tree)
+        .status()
+        .unwrap();
+    assert!(grown.success());
+    let versions = [one, std::fs::read(&tree).unwrap()];
+    assert!(versions[0] != versions[1]);
+    let over = AtomicBool::new(false);
+    let mut baked = 0;
+    std::thread::scope(|scope| {
+        scope.spawn(|| {
+            // In place: cut off, half-written or whole when it is read.
+            for version in versions.iter().cycle() {
+                if over.load(Ordering::Relaxed) {
+                    return;
+                }
+                let (start, end) = version.split_at(version.len() / 2);
+                let mut file = std::fs::File::create(&tree).unwrap();
+                std::io::Write::write_all(&mut file, start).unwrap();
+                std::thread::yield_now();
+                std::io::Write::write_all(&mut file, end).unwrap();
+                std::thread::sleep(Duration::from_millis(2));
+            }
+        });
+        for round in 0..8 {
+            let output = home.path().join(format!("out{round}"));
+            let code = start(&tree, &output, "300").wait().unwrap().code();
+            match code {
+                Some(0) => {
+                    baked += 1;
+                    let read = |name: &str| std::fs::read(output.join(name)).unwrap();
+                    assert!(!read("tree_LOD1.glb").is_empty());
+                    let manifest = String::from_utf8(read("tree.pleach.ron")).unwrap();
+                    let whole = versions.iter().any(|version| {
+                        let sum = pleach::space::sha256::sha256(version);
+                        manifest.contains(&sum)
+                    });
+                    assert!(whole, "round {round}: neither version");
+                }
+                Some(2) => assert!(!output.exists(), "round {round}"),
+                other => panic!("round {round}: {other:?}"),
+            }
+        }
+        over.store(true, Ordering::Relaxed);
+    });
+    println!("{baked} of 8 were read whole");
+}

@@ -1,14 +1,14 @@
 //! `pleach bake`: a tree becomes a package of levels.
 
-use std::io::Write as _;
 use std::path::PathBuf;
 use std::time::Instant;
 
 use super::batch;
+use super::out::{print, say};
 use super::progress::{Bars, catch_ctrl_c};
 use super::scene::scene;
 use crate::batch::Batch;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::knobs::read;
 use crate::pipeline::{Baked, Limit, Request, Wanted, bake, to_json};
 use crate::recipe::{Preset, Recipe};
@@ -100,7 +100,7 @@ pub fn run(args: Args) -> Result<()> {
         stages,
     };
     for warning in baked.warnings.iter().filter(|_| !args.quiet) {
-        eprintln!("warning: {warning}");
+        say(format_args!("warning: {warning}"));
     }
     if args.json {
         let report = Report {
@@ -162,18 +162,6 @@ pub(super) fn limit(text: &str) -> std::result::Result<Limit, String> {
         };
     }
     text.trim().parse().map(Limit::Count).map_err(|_| wrong())
-}
-
-/// A closed pipe is no fault: the reader has seen enough.
-pub(super) fn print(text: &str) -> Result<()> {
-    match std::io::stdout().write_all(text.as_bytes()) {
-        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(Error::io(
-            std::path::Path::new("standard output"),
-            "write",
-            e,
-        )),
-        _ => Ok(()),
-    }
 }
 
 /// One line a level.

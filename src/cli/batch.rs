@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use serde::Serialize;
 
-use super::bake::print;
+use super::out::{print, say};
 use super::progress::Bars;
 use crate::batch::{Batch, Done, Outcome, bake_all};
 use crate::error::{Error, Result};
@@ -42,7 +42,7 @@ pub fn run(batch: &Batch, quiet: bool, json: bool) -> Result<()> {
     bars.finish();
     let outcomes = outcomes?;
     for (input, line) in outcomes.iter().filter(|_| !quiet).flat_map(warnings) {
-        eprintln!("warning: {input}: {line}");
+        say(format_args!("warning: {input}: {line}"));
     }
     let seconds = started.elapsed().as_secs_f64();
     if json {

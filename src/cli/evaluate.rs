@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use super::out::print;
 use crate::botany::Model;
 use crate::botany::load::load;
 use crate::error::{Error, Result};
@@ -87,11 +88,10 @@ pub fn run(args: &Args) -> Result<()> {
         write(folder, &report, &original, &levels, &settings)?;
     }
     if args.json {
-        println!("{}", to_json(&report)?);
+        print(&(to_json(&report)? + "\n"))
     } else {
-        print!("{}", table(&report));
+        print(&table(&report))
     }
-    Ok(())
 }
 
 /// Files and own heights of `FILE[@PIXELS]`.

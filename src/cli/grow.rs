@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
+use super::out::print;
 use crate::botany::grow::{
     Foliage, Grown, MAX_LEAVES, Nodes, Options, Species, TrueSkeleton, Wood, grow,
 };
@@ -59,10 +60,10 @@ pub fn run(args: &GrowArgs) -> Result<()> {
     let truth = TrueSkeleton::path_beside(&args.output);
     write_whole(&truth, grown.skeleton.to_ron().as_bytes())?;
     if args.json {
-        println!("{}", summary(&grown, args, &truth));
+        print(&format!("{}\n", summary(&grown, args, &truth)))?;
     } else if !args.quiet {
-        println!(
-            "{}: {} branches, {} leaves, {} triangles ({} wood, {} foliage), {:.1} MB; skeleton in {}",
+        print(&format!(
+            "{}: {} branches, {} leaves, {} triangles ({} wood, {} foliage), {:.1} MB; skeleton in {}\n",
             args.output.display(),
             grown.skeleton.chains.len(),
             grown.skeleton.leaves.len(),
@@ -71,7 +72,7 @@ pub fn run(args: &GrowArgs) -> Result<()> {
             grown.triangles[1],
             grown.glb.len() as f64 / 1e6,
             truth.display(),
-        );
+        ))?;
     }
     Ok(())
 }

@@ -6,6 +6,7 @@ use std::time::Instant;
 use clap::Args;
 use serde_json::{Value, json};
 
+use super::out::print;
 use crate::botany::recognise::{OrganRule, RecogniseOptions, recognise};
 use crate::botany::tree::{Organ, Tree};
 use crate::botany::{load, portrait};
@@ -59,14 +60,11 @@ pub fn run(args: &InspectArgs) -> Result<()> {
     };
     let summary = Summary::of(&tree);
     if args.json {
-        println!(
-            "{:#}",
-            summary.to_json(&tree, &pictures, [loaded, recognised])
-        );
+        let json = summary.to_json(&tree, &pictures, [loaded, recognised]);
+        print(&format!("{json:#}\n"))
     } else {
-        summary.print(&tree, &pictures, [loaded, recognised]);
+        print(&summary.text(&tree, &pictures, [loaded, recognised]))
     }
-    Ok(())
 }
 
 fn write_pictures(tree: &Tree, folder: &Path) -> Result<Vec<PathBuf>> {
@@ -142,42 +140,44 @@ impl Summary {
         })
     }
 
-    fn print(&self, tree: &Tree, pictures: &[PathBuf], [loaded, recognised]: [f64; 2]) {
-        println!(
-            "{}: {} triangles ({} wood, {} foliage) in {} parts",
+    fn text(&self, tree: &Tree, pictures: &[PathBuf], [loaded, recognised]: [f64; 2]) -> String {
+        let mut out = String::new();
+        out += &format!(
+            "{}: {} triangles ({} wood, {} foliage) in {} parts\n",
             tree.model.name,
             self.wood + self.foliage,
             self.wood,
             self.foliage,
             tree.part_count
         );
-        println!(
-            "leaves     {} in {} classes of congruent ones (largest {:?})",
+        out += &format!(
+            "leaves     {} in {} classes of congruent ones (largest {:?})\n",
             tree.leaves.len(),
             tree.leaf_classes.len(),
             &self.class_sizes[..self.class_sizes.len().min(5)]
         );
-        println!(
-            "skeleton   {} branches, {} nodes",
+        out += &format!(
+            "skeleton   {} branches, {} nodes\n",
             tree.skeleton.chains.len(),
             tree.skeleton.nodes.len()
         );
         for (order, (chains, leaves)) in
             (self.chains_by_order.iter().zip(&self.leaves_by_order)).enumerate()
         {
-            println!("  order {order}  {chains} branches with {leaves} leaves");
+            out += &format!("  order {order}  {chains} branches with {leaves} leaves\n");
         }
-        println!("sub-trees  {}", tree.subtrees.len());
-        println!(
-            "positions  every {:.1e} m of a radius of {:.3} m",
+        out += &format!("sub-trees  {}\n", tree.subtrees.len());
+        out += &format!(
+            "positions  every {:.1e} m of a radius of {:.3} m\n",
             tree.model.position_step, tree.model.frame.radius
         );
-        println!("time       {loaded:.2} s to load, {recognised:.2} s to recognise");
+        out += &format!("time       {loaded:.2} s to load, {recognised:.2} s to recognise\n");
         for warning in self.warnings(tree) {
-            println!("warning: {warning}");
+            out += &format!("warning: {warning}\n");
         }
         for picture in pictures {
-            println!("wrote {}", picture.display());
+            out += &format!("wrote {}\n", picture.display());
         }
+        out
     }
 }

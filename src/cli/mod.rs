@@ -5,6 +5,7 @@ mod batch;
 mod evaluate;
 mod grow;
 mod inspect;
+mod out;
 mod plan;
 mod progress;
 mod scene;
@@ -55,7 +56,7 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error}");
+            out::say(format_args!("error: {error}"));
             ExitCode::from(error.exit_code())
         }
     }

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::bake::print;
+use super::out::{print, say};
 use super::progress::{Bars, catch_ctrl_c};
 use super::scene::scene;
 use crate::batch::{Batch, Done, bake_all};
@@ -106,7 +106,7 @@ fn bake(args: &Args, spec: &Spec, answer: &mut Answer) -> Result<()> {
             let report = match outcome.done {
                 Done::Baked(baked) => {
                     for warning in baked.warnings.iter().filter(|_| !args.quiet) {
-                        eprintln!("warning: {}: {warning}", species.name);
+                        say(format_args!("warning: {}: {warning}", species.name));
                     }
                     baked.report
                 }

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, Subcommand};
 use serde_json::Value;
 
+use super::out;
 use crate::botany::load::load;
 use crate::botany::recognise::{RecogniseOptions, recognise};
 use crate::botany::tree::Tree;
@@ -152,10 +153,9 @@ fn print(
         write(folder)?;
     }
     match common.json {
-        true => println!("{json}"),
-        false => print!("{table}"),
+        true => out::print(&format!("{json}\n")),
+        false => out::print(table),
     }
-    Ok(())
 }
 
 fn run_kratt(args: &KrattArgs) -> Result<()> {
@@ -168,10 +168,9 @@ fn run_kratt(args: &KrattArgs) -> Result<()> {
     }
     let rows = rows?;
     match args.json {
-        true => println!("{}", kratt::to_json(&rows)),
-        false => print!("{}", kratt::table(&rows)),
+        true => out::print(&format!("{}\n", kratt::to_json(&rows))),
+        false => out::print(&kratt::table(&rows)),
     }
-    Ok(())
 }
 
 fn run_lee(args: &LeeArgs) -> Result<()> {

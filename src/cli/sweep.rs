@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use super::bake::{limit, print};
+use super::bake::limit;
+use super::out::print;
 use super::progress::{Bars, catch_ctrl_c};
 use super::scene::scene;
 use crate::error::{Error, Result};

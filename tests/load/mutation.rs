@@ -48,7 +48,7 @@ fn everything() -> File {
     encoder
         .encode(&[9; 192], 8, 8, image::ExtendedColorType::Rgb8)
         .unwrap();
-    for bytes in [&png(4, 4, [1, 2, 3, 4]), &webp, &jpeg] {
+    for bytes in [&png(4, 4, [1, 2, 3, 200]), &webp, &jpeg] {
         let view = file.view(bytes);
         file.add(
             "images",

@@ -23,8 +23,11 @@ pub(super) fn drop_unseen(asset: &Asset, model: &mut Model, warnings: &mut Warni
     }
     let material = |t: u32| model.objects[model.triangle_object[t as usize] as usize].material;
     let materials: Vec<u32> = (0..model.triangles.len() as u32).map(material).collect();
-    for (m, _) in unseen.iter().enumerate().filter(|(_, unseen)| **unseen) {
-        let count = materials.iter().filter(|&&of| of as usize == m).count() as u64;
+    let mut counts = vec![0u64; unseen.len()];
+    for &m in materials.iter().filter(|&&m| unseen[m as usize]) {
+        counts[m as usize] += 1;
+    }
+    for (m, &count) in counts.iter().enumerate().filter(|(_, count)| **count > 0) {
         let place = format!("material \"{}\"", model.materials[m].name);
         let what = "a triangle's texture has no alpha above the material's cutoff: it shows nothing and is left out";
         warnings.count(what, count, &place);
