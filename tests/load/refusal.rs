@@ -357,3 +357,48 @@ fn error_of_claims(extension: Value) -> String {
         f.json["bufferViews"][0]["extensions"] = json!({ "EXT_meshopt_compression": extension })
     })
 }
+
+/// CRC-32 as PNG chunks end with.
+fn crc(bytes: &[u8]) -> u32 {
+    let bits = |start: u32| (0..8).fold(start, |c, _| (c >> 1) ^ (0xEDB8_8320 * (c & 1)));
+    !bytes
+        .iter()
+        .fold(u32::MAX, |c, &b| (c >> 8) ^ bits((c ^ u32::from(b)) & 0xff))
+}
+
+#[test]
+fn images_that_claim_to_be_huge_are_refused_before_they_are_decoded() {
+    let mut bomb = png(1, 1, [9; 4]);
+    for at in [16, 20] {
+        bomb[at..at + 4].copy_from_slice(&65_535u32.to_be_bytes());
+    }
+    let sum = crc(&bomb[12..29]);
+    bomb[29..33].copy_from_slice(&sum.to_be_bytes());
+    let e = error(|f| {
+        let view = f.view(&bomb);
+        f.add("images", json!({ "bufferView": view, "name": "bomb" }));
+        f.add("textures", json!({ "source": 0 }));
+        f.add(
+            "materials",
+            json!({ "pbrMetallicRoughness": { "baseColorTexture": { "index": 0 } } }),
+        );
+        f.primitive()["material"] = json!(0);
+    });
+    has(&e, &["image 0 (bomb)", "65535", "texels"]);
+}
+
+#[test]
+fn text_that_is_no_utf_8_is_refused_and_extensions_named_twice_are_one() {
+    let glb = File::triangle().glb();
+    let name = b"POSITION";
+    let at = glb.windows(name.len()).position(|w| w == name).unwrap();
+    let mut bytes = glb.clone();
+    bytes[at] = 0xff;
+    let refused = load_slice(&bytes, Path::new("x.glb"), &Limits::default()).unwrap_err();
+    assert_eq!(refused.exit_code(), 2);
+    has(&refused.to_string(), &["JSON"]);
+    let mut file = File::triangle();
+    file.json["extensionsUsed"] = json!(["KHR_mesh_quantization", "KHR_mesh_quantization"]);
+    file.json["extensionsRequired"] = file.json["extensionsUsed"].clone();
+    assert_eq!(file.load().unwrap().triangles.len(), 1);
+}
