@@ -95,6 +95,9 @@ impl Package {
     /// # Errors
     /// [`Error::Io`]; then the old package is still in its place.
     pub fn commit(mut self, files: &[String]) -> Result<()> {
+        // Another run may have put its package there meanwhile: what its manifest lists is replaced, too.
+        let meanwhile = replaced(&self.output, true)?;
+        self.old_files.extend(meanwhile);
         let fail = |e| Error::io(&self.output, "move the package to", e);
         if self.only_ours().map_err(fail)? {
             self.swap().map_err(fail)?;
@@ -125,8 +128,9 @@ impl Package {
 
     /// Puts the draft folder where the output folder is, or is to be.
     fn swap(&self) -> std::io::Result<()> {
-        if !self.output.exists() {
-            return std::fs::rename(&self.draft, &self.output);
+        // Where it fails, another run may have been quicker by a moment.
+        if !self.output.exists() && std::fs::rename(&self.draft, &self.output).is_ok() {
+            return Ok(());
         }
         if exchange(&self.draft, &self.output).is_ok() {
             return std::fs::remove_dir_all(&self.draft);
@@ -255,6 +259,26 @@ mod tests {
         bake(&output, false, &["a", "b"]).unwrap();
         bake(&output, false, &["a"]).unwrap();
         assert_eq!(names(&output), ["a", "t.pleach.ron"]);
+        assert_eq!(names(home.path()), ["oak"]);
+    }
+
+    #[test]
+    fn of_two_that_started_together_the_later_one_is_there_whole() {
+        let home = tempfile::tempdir().unwrap();
+        let output = home.path().join("oak");
+        let late = Package::start(&output, false).unwrap();
+        late.write("a", b"late").unwrap();
+        late.write("t.pleach.ron", b"late").unwrap();
+        // A draft of the same process has the same name: the other one's is made by hand.
+        std::fs::create_dir(&output).unwrap();
+        for name in ["a", "b"] {
+            std::fs::write(output.join(name), b"early").unwrap();
+        }
+        let manifest = "(format: \"pleach\", files: [\"a\", \"b\", \"t.pleach.ron\"])";
+        std::fs::write(output.join("t.pleach.ron"), manifest).unwrap();
+        late.commit(&["a".into(), "t.pleach.ron".into()]).unwrap();
+        assert_eq!(names(&output), ["a", "t.pleach.ron"]);
+        assert_eq!(std::fs::read(output.join("a")).unwrap(), b"late");
         assert_eq!(names(home.path()), ["oak"]);
     }
 
