@@ -40,6 +40,8 @@ pub mod ladder;
 #[cfg(feature = "bake")]
 pub mod level;
 #[cfg(feature = "bake")]
+mod measured_visibility;
+#[cfg(feature = "bake")]
 pub mod pipeline;
 #[cfg(feature = "bake")]
 pub mod plan;
@@ -50,8 +52,6 @@ pub mod report;
 pub mod runtime;
 #[cfg(feature = "bake")]
 pub mod scene;
-#[cfg(feature = "bake")]
-mod seen;
 pub mod space;
 #[cfg(feature = "bake")]
 pub mod study;

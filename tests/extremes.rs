@@ -112,6 +112,11 @@ fn bake(parts: &[(&str, Part)], more: &[&str]) -> Report {
     serde_json::from_slice(&done.stdout).unwrap()
 }
 
+/// Mean F1 of each level at its own size.
+fn f1(report: &Report) -> Vec<f64> {
+    report.levels.iter().map(|l| l.sizes[0].f1.mean).collect()
+}
+
 #[test]
 fn one_leaf_and_two_are_their_own_levels() {
     for count in [1, 2] {
@@ -139,7 +144,7 @@ fn leaves_in_a_plane_on_a_line_and_far_from_their_trunk_are_baked() {
     ];
     for (name, parts) in cases {
         let report = bake(&parts, &["--triangles", "20%,24"]);
-        let f1: Vec<f64> = report.levels.iter().map(|l| l.sizes[0].f1.mean).collect();
+        let f1 = f1(&report);
         assert!(f1.len() == 2 && f1[0] > 0.7, "{name}: {f1:?}");
     }
 }
@@ -156,7 +161,7 @@ fn wood_or_foliage_alone_and_a_ring_of_wood_are_baked() {
     ];
     for (name, parts) in cases {
         let report = bake(&parts, &["--triangles", "50%,24"]);
-        let f1: Vec<f64> = report.levels.iter().map(|l| l.sizes[0].f1.mean).collect();
+        let f1 = f1(&report);
         assert!(f1.len() == 2 && f1[0] > 0.8, "{name}: {f1:?}");
     }
 }
@@ -202,13 +207,7 @@ fn leaves_in_one_point_are_one_and_a_tree_that_is_there_twice_is_one_tree() {
     let [once, twice] = [once, twice].map(|parts| bake(&parts, &["--triangles", "20%,24"]));
     let triangles = |r: &Report| r.original.as_ref().unwrap().triangles;
     assert_eq!(triangles(&twice), triangles(&once));
-    let figures = |r: &Report| {
-        r.levels
-            .iter()
-            .map(|l| l.sizes[0].f1.mean)
-            .collect::<Vec<_>>()
-    };
-    assert_eq!(figures(&twice), figures(&once));
+    assert_eq!(f1(&twice), f1(&once));
 }
 
 /// One closed skin with bumps, around as many degrees as a globe has.
@@ -273,7 +272,7 @@ fn one_welded_skin_and_branches_that_touch_themselves_are_baked() {
     ];
     for (name, parts) in cases {
         let report = bake(&parts, &["--triangles", "20%,24"]);
-        let f1: Vec<f64> = report.levels.iter().map(|l| l.sizes[0].f1.mean).collect();
+        let f1 = f1(&report);
         assert!(f1.len() == 2 && f1[0] > 0.9, "{name}: {f1:?}");
     }
 }
@@ -319,7 +318,7 @@ fn a_million_separate_triangles_are_baked() {
     }
     let parts = [("bark", trunk()), ("leaf", (points, triangles))];
     let report = bake(&parts, &["--triangles", "1%,24"]);
-    let f1: Vec<f64> = report.levels.iter().map(|l| l.sizes[0].f1.mean).collect();
+    let f1 = f1(&report);
     assert!(f1.len() == 2 && f1[0] > 0.9, "{f1:?}");
 }
 
@@ -366,7 +365,7 @@ fn under_texture(side: u32) -> Vec<f64> {
     let message = String::from_utf8_lossy(&done.stderr).into_owned();
     assert!(done.status.success(), "{message}");
     let report: Report = serde_json::from_slice(&done.stdout).unwrap();
-    report.levels.iter().map(|l| l.sizes[0].f1.mean).collect()
+    f1(&report)
 }
 
 #[test]

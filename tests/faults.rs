@@ -347,4 +347,9 @@ fn an_input_that_changes_while_it_is_read_is_one_of_its_versions_or_an_error() {
         over.store(true, Ordering::Relaxed);
     });
     println!("{baked} of 8 were read whole");
+    // Once nobody writes any more, it is a tree like any other.
+    std::fs::write(&tree, &versions[0]).unwrap();
+    let output = home.path().join("after");
+    assert!(start(&tree, &output, "300").wait().unwrap().success());
+    assert!(output.join("tree_LOD1.glb").is_file());
 }

@@ -90,27 +90,33 @@ fn bakes(count: u64) -> Vec<u64> {
     (0..count).map(one).collect()
 }
 
-/// Memory at the end over that after `warm` bakes; the largest of some, because one bake is larger than another.
-fn growth(resident: &[u64], warm: usize) -> f64 {
-    let most = |part: &[u64]| part.iter().copied().max().unwrap_or(0) as f64;
-    let (start, end) = (
+/// Bytes in use after `warm` bakes and at the end; the largest of some, because one bake is larger than another.
+fn before_and_after(resident: &[u64], warm: usize) -> [u64; 2] {
+    let most = |part: &[u64]| part.iter().copied().max().unwrap_or(0);
+    let [start, end] = [
         most(&resident[..warm]),
         most(&resident[resident.len() - 7..]),
-    );
+    ];
     println!(
         "{} bakes: {:.1} MB after {warm}, {:.1} MB at the end",
         resident.len(),
-        start / 1e6,
-        end / 1e6
+        start as f64 / 1e6,
+        end as f64 / 1e6
     );
-    end / start
+    [start, end]
 }
+
+/// What the allocator keeps varies by so much, in bytes, whatever is done.
+const SLACK: u64 = 4_000_000;
 
 #[test]
 fn memory_does_not_grow_from_tree_to_tree() {
     let _alone = alone();
     match resident() {
-        Some(_) => assert!(growth(&bakes(20), 12) < 1.1),
+        Some(_) => {
+            let [start, end] = before_and_after(&bakes(20), 12);
+            assert!(end < start + SLACK, "{start} {end}");
+        }
         None => println!("skipped: this system does not tell a process's memory"),
     }
 }
@@ -124,7 +130,8 @@ fn a_thousand_trees_need_the_memory_of_a_hundred() {
         resident().is_some(),
         "this system does not tell a process's memory"
     );
-    assert!(growth(&bakes(1000), 100) < 1.02);
+    let [start, end] = before_and_after(&bakes(1000), 100);
+    assert!(end < start + SLACK, "{start} {end}");
 }
 
 /// Bakes `count` spoiled files; returns how many became packages.

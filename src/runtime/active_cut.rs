@@ -5,30 +5,11 @@
 //! nodes are far from the distance at which they switch and stay untouched for many frames; the
 //! cut is nevertheless the same, at every frame, as one made anew.
 
-use super::forest::Drawn;
+use super::drawn::Drawn;
 use super::hierarchy::Hierarchy;
-use super::looking::{List, Looking};
+use super::looking::{Changes, List, Looking};
 use super::place::{Place, View};
 use super::visibility::Visibility;
-
-/// What a frame changed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Changes {
-    /// Nodes that were opened.
-    pub splits: u32,
-    /// Nodes that were closed.
-    pub merges: u32,
-    /// Nodes that were looked at.
-    pub looked_at: u32,
-}
-
-impl std::ops::AddAssign for Changes {
-    fn add_assign(&mut self, other: Self) {
-        self.splits += other.splits;
-        self.merges += other.merges;
-        self.looked_at += other.looked_at;
-    }
-}
 
 /// How far the eye has come.
 #[derive(Clone, Debug, Default)]

@@ -1,34 +1,12 @@
 //! Many trees: a cut through each, kept by splits and merges between frames.
 
-use super::active_cut::{Changes, Clock};
+use super::active_cut::Clock;
+use super::drawn::Drawn;
 use super::hierarchy::Hierarchy;
-use super::looking::{First, List, Looking, collect_still, is_closed, least};
+use super::looking::{Changes, First, List, Looking, collect_still, is_closed, least};
 use super::place::{Place, Pyramid, Spheres, View};
 use super::pool::{Pool, Slot};
 use super::visibility::Visibility;
-
-/// How a sub-tree is drawn.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Form {
-    /// By its billboards, with all that it carries.
-    Billboard,
-    /// By its own triangles: it carries nothing else.
-    Geometry,
-}
-
-/// One thing to draw.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Drawn {
-    /// Index of the tree.
-    pub tree: u32,
-    /// Index of the node in the species' [`Hierarchy`].
-    pub node: u32,
-    /// How.
-    pub form: Form,
-    /// 1: all of it. Less: the node fades in over its children, which are drawn in full; a page
-    /// dithers this share of its pixels.
-    pub fade: f32,
-}
 
 /// Trees of a few species. For several threads, make one forest for each thread from a part of the
 /// trees, every second one for each of two, so that what is near is shared alike: [`Visibility`] and

@@ -2,11 +2,29 @@
 
 use glam::Vec3;
 
-use super::active_cut::Changes;
-use super::forest::{Drawn, Form};
+use super::drawn::{Drawn, Form};
 use super::hierarchy::Hierarchy;
 use super::place::{Place, View};
 use super::visibility::Visibility;
+
+/// What a frame changed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Changes {
+    /// Nodes that were opened.
+    pub splits: u32,
+    /// Nodes that were closed.
+    pub merges: u32,
+    /// Nodes that were looked at.
+    pub looked_at: u32,
+}
+
+impl std::ops::AddAssign for Changes {
+    fn add_assign(&mut self, other: Self) {
+        self.splits += other.splits;
+        self.merges += other.merges;
+        self.looked_at += other.looked_at;
+    }
+}
 
 /// In a list of nodes: what stands for the node are its children (or, for a tip, its geometry).
 pub(super) const OPEN: u32 = 1 << 31;

@@ -257,6 +257,16 @@ fn uris_that_leave_the_folder_are_refused() {
     assert!(matches!(load(&inner), Err(pleach::Error::Input { .. })));
 }
 
+/// Gives the file's primitive a texture of these bytes.
+fn bark(file: &mut File, image: &[u8]) {
+    let view = file.view(image);
+    file.add("images", json!({ "bufferView": view, "name": "bark" }));
+    file.add("textures", json!({ "source": 0 }));
+    let material = json!({ "pbrMetallicRoughness": { "baseColorTexture": { "index": 0 } } });
+    file.add("materials", material);
+    file.primitive()["material"] = json!(0);
+}
+
 #[test]
 fn broken_data_uris_containers_and_images_are_refused() {
     for uri in ["data:nothing", "data:;base64,@@@@", "data:;base64"] {
@@ -287,17 +297,7 @@ fn broken_data_uris_containers_and_images_are_refused() {
         b"RIFF\0\0\0\0WEBPVP8 ",
         b"\xff\xd8\xff\xe0",
     ] {
-        let e = error(|f| {
-            let view = f.view(image);
-            f.add("images", json!({ "bufferView": view, "name": "bark" }));
-            f.add("textures", json!({ "source": 0 }));
-            f.add(
-                "materials",
-                json!({ "pbrMetallicRoughness": { "baseColorTexture": { "index": 0 } } }),
-            );
-            f.primitive()["material"] = json!(0);
-        });
-        has(&e, &["image 0 (bark)", "PNG"]);
+        has(&error(|f| bark(f, image)), &["image 0 (bark)", "PNG"]);
     }
 }
 
@@ -374,17 +374,8 @@ fn images_that_claim_to_be_huge_are_refused_before_they_are_decoded() {
     }
     let sum = crc(&bomb[12..29]);
     bomb[29..33].copy_from_slice(&sum.to_be_bytes());
-    let e = error(|f| {
-        let view = f.view(&bomb);
-        f.add("images", json!({ "bufferView": view, "name": "bomb" }));
-        f.add("textures", json!({ "source": 0 }));
-        f.add(
-            "materials",
-            json!({ "pbrMetallicRoughness": { "baseColorTexture": { "index": 0 } } }),
-        );
-        f.primitive()["material"] = json!(0);
-    });
-    has(&e, &["image 0 (bomb)", "65535", "texels"]);
+    let e = error(|f| bark(f, &bomb));
+    has(&e, &["image 0 (bark)", "65535", "texels"]);
 }
 
 #[test]
