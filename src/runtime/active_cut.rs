@@ -24,6 +24,11 @@ pub(super) struct Clock {
 const LONG_PATH: f32 = 4096.0;
 
 impl Clock {
+    /// The view that it moved to last.
+    pub fn view(&self) -> Option<View> {
+        self.last.map(|(view, _)| view)
+    }
+
     /// Moves on to a view; whether everything has to be looked at, and whether what was asked for its
     /// occlusion has.
     pub fn tick(&mut self, view: &View, fade: f32, epoch: u64) -> (bool, bool) {
@@ -103,11 +108,12 @@ impl<V: Visibility> ActiveCut<V> {
 
     /// Appends what is drawn, seen from where the cut was last updated; see [`Drawn`].
     pub fn collect(&mut self, view: &View, out: &mut Vec<Drawn>) {
+        let updated = self.clock.view().unwrap_or(*view);
         let mut looking = Looking::new(
             &self.hierarchy,
             &mut self.visibility,
             &self.place,
-            view,
+            &updated,
             (self.clock.path, self.fade),
         );
         looking.collect(0, &self.list.nodes, &self.list.fades, out);

@@ -14,7 +14,7 @@ pub enum Form {
 pub struct Drawn {
     /// Index of the tree.
     pub tree: u32,
-    /// Index of the node in the species' [`Hierarchy`].
+    /// Index of the node in the species' [`Hierarchy`](super::Hierarchy).
     pub node: u32,
     /// How.
     pub form: Form,

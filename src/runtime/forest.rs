@@ -3,7 +3,7 @@
 use super::active_cut::Clock;
 use super::drawn::Drawn;
 use super::hierarchy::Hierarchy;
-use super::looking::{Changes, First, List, Looking, collect_still, is_closed, least};
+use super::looking::{Changes, First, List, Looking, collect_still, is_closed, least_unveiled};
 use super::place::{Place, Pyramid, Spheres, View};
 use super::pool::{Pool, Slot};
 use super::visibility::Visibility;
@@ -22,18 +22,23 @@ pub struct Forest<V> {
     clock: Clock,
     /// For each tree its bounding sphere in the world.
     spheres: Spheres,
-    /// For each tree whether it may be in the picture.
-    inside: Vec<bool>,
+    /// For each tree 0 where it may be in the picture, infinity where not.
+    veil: Vec<f32>,
     /// For each tree whether its cut rests on what is hidden.
     asked: Vec<bool>,
-    /// For each tree the path at which its first node is due.
+    /// For each tree the path at which its first node is due; [`ANEW`] where all of its nodes are.
     due: Vec<f32>,
     /// For each tree the path at which its first node may begin to fade.
     fades: Vec<f32>,
     slots: Vec<Slot>,
     pool: Pool,
     spare: List,
+    /// What [`Forest::collect`] had to change.
+    late: Changes,
 }
+
+/// Due, and nothing that was known holds any more.
+const ANEW: f32 = f32::NEG_INFINITY;
 
 impl<V: Visibility> Forest<V> {
     /// All trees as coarse as they get. A place's species that doesn't exist is taken as the last.
@@ -55,9 +60,9 @@ impl<V: Visibility> Forest<V> {
         };
         Self {
             spheres: Spheres::new(places.iter().map(sphere)),
-            inside: vec![false; places.len()],
+            veil: vec![f32::INFINITY; places.len()],
             asked: vec![false; places.len()],
-            due: vec![0.0; places.len()],
+            due: vec![ANEW; places.len()],
             fades: vec![0.0; places.len()],
             species,
             places,
@@ -67,33 +72,46 @@ impl<V: Visibility> Forest<V> {
             slots,
             pool,
             spare: List::with_capacity(most),
+            late: Changes::default(),
         }
     }
 
-    /// Follows the camera. Allocates only while lists grow to a size that they never had before.
+    /// Follows the camera. Trees that can't be in the picture wait: a cut is made when it is asked for,
+    /// by a later frame or by [`Forest::collect`]. Allocates only while lists grow to a size that they
+    /// never had before.
     pub fn update(&mut self, view: &View) -> Changes {
         let epoch = self.visibility.epoch(view.eye);
         let (all, hidden) = self.clock.tick(view, self.fade, epoch);
+        if all {
+            self.due.fill(ANEW);
+        } else if hidden {
+            let asked = self.due.iter_mut().zip(&self.asked);
+            asked.for_each(|(due, &asked)| *due = if asked { ANEW } else { *due });
+        }
+        let mut changes = std::mem::take(&mut self.late);
+        if !view.sees() {
+            return changes;
+        }
+        Pyramid::new(view).veils(&self.spheres, &mut self.veil);
         let path = self.clock.path;
-        let mut changes = Changes::default();
         // Most trees are due in no frame: they are passed over in groups.
         const TOGETHER: usize = 32;
         for start in (0..self.due.len()).step_by(TOGETHER) {
             let end = (start + TOGETHER).min(self.due.len());
-            if !all && !hidden && least(&self.due[start..end]) > path {
+            if least_unveiled(&self.due[start..end], &self.veil[start..end]) > path {
                 continue;
             }
             for tree in start..end {
-                let anew = all || (hidden && self.asked[tree]);
-                if anew || self.due[tree] <= path {
-                    changes += self.refresh(tree, view, path, anew);
+                if self.due[tree].max(self.veil[tree]) <= path {
+                    changes += self.refresh(tree, view, path);
                 }
             }
         }
         changes
     }
 
-    fn refresh(&mut self, tree: usize, view: &View, path: f32, all: bool) -> Changes {
+    fn refresh(&mut self, tree: usize, view: &View, path: f32) -> Changes {
+        let all = self.due[tree] == ANEW;
         let (place, range) = (&self.places[tree], Pool::range(self.slots[tree]));
         let hierarchy = &self.species[place.species as usize];
         let marks = (path, self.fade);
@@ -133,15 +151,17 @@ impl<V: Visibility> Forest<V> {
     }
 
     /// Appends what is to be drawn of all trees that may be in the picture, by tree, seen from where
-    /// the cuts were last updated.
+    /// the cuts were last updated. The picture may be another than that of the update (a shadow's): what
+    /// has waited outside of it is cut now.
     pub fn collect(&mut self, view: &View, out: &mut Vec<Drawn>) {
         if !view.sees() {
             return;
         }
-        let (pyramid, path) = (Pyramid::new(view), self.clock.path);
-        pyramid.meets_all(&self.spheres, &mut self.inside);
-        for (tree, (&inside, &slot)) in self.inside.iter().zip(&self.slots).enumerate() {
-            if !inside {
+        self.prepare(view);
+        let path = self.clock.path;
+        let updated = self.clock.view().unwrap_or(*view);
+        for (tree, (&veil, &slot)) in self.veil.iter().zip(&self.slots).enumerate() {
+            if veil > 0.0 {
                 continue;
             }
             let range = Pool::range(slot);
@@ -153,8 +173,26 @@ impl<V: Visibility> Forest<V> {
             let place = &self.places[tree];
             let hierarchy = &self.species[place.species as usize];
             let marks = (path, self.fade);
-            let mut looking = Looking::new(hierarchy, &mut self.visibility, place, view, marks);
+            let mut looking = Looking::new(hierarchy, &mut self.visibility, place, &updated, marks);
             looking.collect(tree as u32, nodes, &self.pool.fades[range], out);
+        }
+    }
+
+    /// Cuts what may be in this picture and was not in that of the last update.
+    fn prepare(&mut self, view: &View) {
+        let updated = self.clock.view();
+        if updated == Some(*view) {
+            return;
+        }
+        Pyramid::new(view).veils(&self.spheres, &mut self.veil);
+        let (Some(updated), path) = (updated, self.clock.path) else {
+            return;
+        };
+        for tree in 0..self.due.len() {
+            if self.due[tree].max(self.veil[tree]) <= path {
+                let changes = self.refresh(tree, &updated, path);
+                self.late += changes;
+            }
         }
     }
 

@@ -113,6 +113,21 @@ pub(super) fn least(numbers: &[f32]) -> f32 {
     all.fold(f32::INFINITY, |a, &b| smaller(a, b))
 }
 
+/// The least of what is due and not veiled (infinite); likewise.
+#[inline]
+pub(super) fn least_unveiled(dues: &[f32], veils: &[f32]) -> f32 {
+    const LANES: usize = 8;
+    let later = |due: f32, veil: f32| if due > veil { due } else { veil };
+    let mut lanes = [f32::INFINITY; LANES];
+    for (dues, veils) in dues.chunks(LANES).zip(veils.chunks(LANES)) {
+        for ((lane, &due), &veil) in lanes.iter_mut().zip(dues).zip(veils) {
+            let due = later(due, veil);
+            *lane = if due < *lane { due } else { *lane };
+        }
+    }
+    lanes.iter().fold(f32::INFINITY, |a, &b| a.min(b))
+}
+
 /// What a look at a node found.
 #[derive(Clone, Copy, Debug)]
 struct Seen {

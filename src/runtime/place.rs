@@ -125,14 +125,15 @@ impl Pyramid {
         (depth > -radius) & !outside(self.sides[0]) & !outside(self.sides[1])
     }
 
-    /// Which of many spheres may be inside.
-    pub fn meets_all(&self, spheres: &Spheres, inside: &mut Vec<bool>) {
+    /// For each of many spheres 0 where it may be inside, infinity where not.
+    pub fn veils(&self, spheres: &Spheres, veil: &mut Vec<f32>) {
         let [x, y, z, radius] = &spheres.0;
         let count = radius.len();
-        inside.resize(count, false);
-        let (x, y, z, inside) = (&x[..count], &y[..count], &z[..count], &mut inside[..count]);
+        veil.resize(count, 0.0);
+        let (x, y, z, veil) = (&x[..count], &y[..count], &z[..count], &mut veil[..count]);
         for i in 0..count {
-            inside[i] = self.meets(Vec3::new(x[i], y[i], z[i]), radius[i]);
+            let inside = self.meets(Vec3::new(x[i], y[i], z[i]), radius[i]);
+            veil[i] = if inside { 0.0 } else { f32::INFINITY };
         }
     }
 }
