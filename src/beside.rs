@@ -72,7 +72,12 @@ pub fn hierarchy(
     files: &mut Vec<String>,
     watch: &dyn Watch,
 ) -> Result<Tiles> {
-    let (tiles, images) = bake_tiles(package, tree, recipe, scene, watch)?;
+    // Tiles lie on one page in blocks of their own, and each is loaded when it is needed.
+    let recipe = Recipe {
+        sharing: 0.0,
+        ..recipe.clone()
+    };
+    let (tiles, images) = bake_tiles(package, tree, &recipe, scene, watch)?;
     let last = files.len() - 1;
     let more = tiles.files().map(str::to_owned).chain(images);
     files.splice(last..last, more);

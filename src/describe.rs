@@ -13,6 +13,7 @@ use crate::detail::optimal_distance::{Aspect, Own, aspects};
 use crate::export::chart::Chart;
 use crate::export::foliage::CardGroup;
 use crate::export::manifest::{self, Card, Level, Original, Range, Subtree};
+use crate::export::share::owners;
 use crate::level;
 use crate::scene::Scene;
 
@@ -121,7 +122,11 @@ impl<'a> Describer<'a> {
             wood_triangles: made.scene.triangles().saturating_sub(foliage),
             cards: groups
                 .zip(&made.charts)
-                .map(|((group, members), chart)| self.card(group, members, chart, &range))
+                .zip(owners(&made.charts, made.atlas))
+                .map(|(((group, members), chart), copy_of)| Card {
+                    copy_of,
+                    ..self.card(group, members, chart, &range)
+                })
                 .collect(),
         }
     }
@@ -156,6 +161,7 @@ impl<'a> Describer<'a> {
         Card {
             subtree: self.common_subtree(members),
             corners: chart.corners.iter().map(|&p| world(frame, p)).collect(),
+            copy_of: None,
             atlas: [chart.place[0], chart.place[1], chart.size[0], chart.size[1]],
             shows: group.triangles.len() as u32,
             error_m: shown.rms_distance() * frame.radius,

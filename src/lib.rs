@@ -46,12 +46,18 @@ pub mod pipeline;
 #[cfg(feature = "bake")]
 pub mod plan;
 #[cfg(feature = "bake")]
+mod provenance;
+#[cfg(feature = "bake")]
 pub mod recipe;
 #[cfg(feature = "bake")]
 pub mod report;
+#[cfg(feature = "bake")]
+mod request;
 pub mod runtime;
 #[cfg(feature = "bake")]
 pub mod scene;
+#[cfg(feature = "bake")]
+mod sharing;
 pub mod space;
 #[cfg(feature = "bake")]
 pub mod study;
@@ -65,6 +71,8 @@ pub mod tiles;
 pub mod verdict;
 #[cfg(feature = "bake")]
 pub mod watch;
+#[cfg(feature = "bake")]
+mod written;
 
 #[cfg(feature = "bake")]
 pub use error::{Error, Result};

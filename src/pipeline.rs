@@ -1,64 +1,38 @@
 //! The bake: every step in order, one line each. Read this first.
 
-use std::path::{Path, PathBuf};
-use std::sync::Arc;
-
-use serde_json::Value;
-
 use crate::beside::{alone, hierarchy, instanced, told};
-use crate::botany::load::{load, load_slice, read, references};
+use crate::botany::load::{load, load_slice, read};
 use crate::botany::model::Model;
+use crate::botany::portrait;
 use crate::botany::recognise::{RecogniseOptions, recognise};
 use crate::botany::tree::Tree;
 use crate::describe::Describer;
 use crate::detail::element::elements;
 use crate::detail::merge::merge;
+use crate::detail::optimal_cut::Candidate;
 use crate::detail::optimal_distance::TEXELS;
 use crate::detail::wood::Wood;
 use crate::error::{Error, Result};
-use crate::export::combined::{Packed, extras, write_combined};
-use crate::export::gltf::write_glb;
-use crate::export::manifest::{
-    self, FORMAT, Manifest, Provenance, Range, Reference, SUFFIX, VERSION, Visibility,
-};
+use crate::export::combined::{Packed, extras};
+use crate::export::manifest::{self, FORMAT, Manifest, Range, VERSION, Visibility};
 use crate::export::original::Original;
 use crate::export::package::{Package, remove_beside};
-use crate::export::png::encode_images;
-use crate::export::surface::{self, scene_of_model};
+use crate::export::surface::scene_of_model;
 use crate::knobs::check;
 use crate::ladder::{LEAST_TRIANGLES, Rung, WHOLE_TREE_TRIANGLES, ranges, rungs, seen};
 pub use crate::ladder::{Limit, Wanted};
 use crate::level::{Baker, LevelRequest, MASK_HEIGHT};
 use crate::measured_visibility::measure_subtrees;
-use crate::recipe::{Method, Recipe};
+use crate::provenance::check_name;
+pub use crate::provenance::provenance;
+use crate::recipe::Method;
 use crate::report::schema::Report;
-use crate::report::{Judged, Settings, heights, judge};
-use crate::scene::Scene;
-use crate::space::sha256::sha256;
+use crate::report::{Judged, Making, Recognised, Settings, heights, judge};
+pub use crate::request::Request;
+use crate::sharing;
 use crate::verdict::{REFUSED, in_band, refusal};
 use crate::watch::{Deadline, Watch, begin, part, step};
-
-/// What to bake.
-#[derive(Clone, Debug, Default)]
-pub struct Request {
-    /// The tree.
-    pub input: PathBuf,
-    /// The package's folder.
-    pub output: PathBuf,
-    /// Which levels.
-    pub wanted: Wanted,
-    /// Levels take no more triangles than this error needs, in pixels where they start. Beside a
-    /// limit of triangles, both hold.
-    pub max_error_px: Option<f64>,
-    /// Knobs.
-    pub recipe: Recipe,
-    /// The screen that levels are for.
-    pub scene: Scene,
-    /// Whether to write into a folder that holds other files.
-    pub force: bool,
-    /// Whether to keep levels that left their band.
-    pub accept: bool,
-}
+use crate::written::{Share, encoded, sheets, write};
 
 /// What was baked.
 #[derive(Clone, Debug, Default)]
@@ -67,15 +41,14 @@ pub struct Baked {
     pub report: Report,
     /// The package's files, the manifest last.
     pub files: Vec<String>,
+    /// How the levels were chosen, where a page was asked for.
+    pub making: Making,
     /// What was repaired, guessed or, by `accept`, tolerated.
     pub warnings: Vec<String>,
 }
 
 /// Azimuth of the first view of the report, degrees: not one of those that levels were fitted to.
 const REPORT_OFFSET_DEG: f32 = 11.0;
-
-/// Bytes of the longest name of a tree: the rest of 255 is for "_hierarchy.glb" and names of drafts.
-const LONGEST_NAME: usize = 220;
 
 /// Bakes a tree into a package: complete, or nothing.
 ///
@@ -118,9 +91,15 @@ fn made(request: &Request, watch: &dyn Watch) -> Result<Baked> {
         height_m(&tree.model),
         width_to_height(&tree.model),
     );
-    let (packed, levels) = levels(request, &tree, &rungs, &ranges, watch)?;
+    let Levels {
+        packed,
+        manifest: levels,
+        shares,
+        candidates,
+    } = levels(request, &tree, &rungs, &ranges, watch)?;
     begin(watch, "write", packed.len() as u64 + 1)?;
     let mut files = write(&package, &tree, &packed, watch)?;
+    let shares = sheets(&package, &packed[1..], shares, &mut files)?;
     let instancing = match request.recipe.instancing {
         true => instanced(&package, &tree, &request.recipe, &packed[0], &mut files)?,
         false => None,
@@ -141,12 +120,18 @@ fn made(request: &Request, watch: &dyn Watch) -> Result<Baked> {
     };
     let judged = read_back(&package, &packed[1..], &rungs)?;
     begin(watch, "measure", heights(&judged).len() as u64)?;
+    let report = measure(&tree.model, &files[0], &judged, watch)?;
+    let sharing = sharing::told(&report, shares);
+    let mut warnings = levels.tree.warnings.clone();
+    if request.recipe.sharing > 0.0 {
+        warnings.extend(sharing::kept(&sharing, request.recipe.sharing));
+    }
     let report = Report {
+        sharing: Some(sharing),
         instancing,
         hierarchy: tiles.as_ref().map(told),
-        ..measure(&tree.model, &files[0], &judged, watch)?
+        ..report
     };
-    let mut warnings = levels.tree.warnings.clone();
     if request.recipe.instancing {
         warnings.extend(alone(&tree, &request.recipe, report.instancing.as_ref()));
     }
@@ -156,6 +141,10 @@ fn made(request: &Request, watch: &dyn Watch) -> Result<Baked> {
         return Err(refusal(&found, &beside));
     }
     warnings.extend(found.into_iter().map(|f| f.what));
+    let making = match request.page {
+        true => making(&tree, candidates, &levels)?,
+        false => Making::default(),
+    };
     let manifest = Manifest {
         provenance,
         files: files.clone(),
@@ -170,53 +159,35 @@ fn made(request: &Request, watch: &dyn Watch) -> Result<Baked> {
     Ok(Baked {
         report,
         files,
+        making,
         warnings,
     })
 }
 
-/// File systems take names of 255 bytes, and a package's files are named after the tree.
-fn check_name(input: &Path) -> Result<()> {
-    let bytes = input.file_stem().map_or(0, |stem| stem.len());
-    if bytes <= LONGEST_NAME {
-        return Ok(());
-    }
-    Err(Error::usage(
-        format!(
-            "{}: the tree's name has {bytes} bytes, and the files of its package would have more than file systems take",
-            input.display()
-        ),
-        format!("rename it: {LONGEST_NAME} bytes before the extension at most"),
-    ))
-}
-
-/// Where a package comes from; `input` are the input's bytes.
-///
-/// # Errors
-/// Those of [`references`].
-pub fn provenance(request: &Request, input: &[u8]) -> Result<Provenance> {
-    let name = request.input.file_name().unwrap_or_default();
-    let others = references(input, &request.input, &request.recipe.limits)?;
-    let mut asked = request.wanted.to_string();
-    if let Some(pixels) = request.max_error_px {
-        asked += &format!(" --max-error {pixels}");
-    }
-    if request.accept {
-        asked += " --accept";
-    }
-    Ok(Provenance {
-        generator: concat!("pleach ", env!("CARGO_PKG_VERSION")).into(),
-        input: name.to_string_lossy().into_owned(),
-        input_bytes: input.len() as u64,
-        input_sha256: sha256(input),
-        references: others
-            .into_iter()
-            .map(|(uri, bytes)| Reference {
-                uri,
-                sha256: sha256(&bytes),
+fn making(tree: &Tree, candidates: Vec<Candidate>, levels: &Manifest) -> Result<Making> {
+    let chosen = levels.levels.iter().skip(1).map(|level| Candidate {
+        triangles: level.triangles,
+        error_m: level.error_m,
+    });
+    let recognised = portrait::all(tree)?.into_iter();
+    Ok(Making {
+        candidates,
+        chosen: chosen.collect(),
+        recognised: recognised
+            .map(|(name, png)| Recognised {
+                name: name.into(),
+                png,
             })
             .collect(),
-        asked,
     })
+}
+
+/// All levels, level 0 first, and what is told of them.
+struct Levels {
+    packed: Vec<Packed>,
+    manifest: Manifest,
+    shares: Vec<Share>,
+    candidates: Vec<Candidate>,
 }
 
 /// Makes all levels, level 0 included, and describes them.
@@ -226,7 +197,7 @@ fn levels(
     rungs: &[Rung],
     ranges: &[Range],
     watch: &dyn Watch,
-) -> Result<(Vec<Packed>, Manifest)> {
+) -> Result<Levels> {
     begin(watch, "group", 1)?;
     let elements = elements(tree);
     let hierarchy = merge(&elements, request.recipe.locality);
@@ -272,6 +243,10 @@ fn levels(
         range: ranges[0],
     }];
     step(watch)?;
+    let mut shares = Vec::with_capacity(rungs.len());
+    let heights: Vec<u32> = rungs.iter().map(|r| pixels(r.height_px)).collect();
+    let ruler = (request.recipe.sharing > 0.0)
+        .then(|| sharing::Ruler::new(&tree.model, &heights, &settings()));
     for (rung, &range) in rungs.iter().zip(&ranges[1..]) {
         let level = packed.len();
         let enough = request.max_error_px.map_or(u64::MAX, |pixels| {
@@ -285,6 +260,18 @@ fn levels(
         };
         let level_wanted = LevelRequest::of(&rung, request.recipe.method);
         let made = baker.level(level_wanted, watch)?;
+        let (made, share) = match &ruler {
+            Some(ruler) => {
+                let most = (pixels(rung.height_px), request.recipe.sharing);
+                let chosen = ruler.choose(made, level, most)?;
+                (chosen.level, (chosen.told, chosen.sheet))
+            }
+            None => {
+                let told = sharing::alone(&made, level);
+                (made, (told, None))
+            }
+        };
+        shares.push(share);
         part(watch, "encode")?;
         let described = describer.level(level, &(name(level) + ".glb"), &made, range);
         let (pngs, scene) = encoded(made.scene)?;
@@ -298,45 +285,20 @@ fn levels(
         manifest.levels.push(described);
         step(watch)?;
     }
-    Ok((packed, manifest))
-}
-
-/// A scene's images as PNG, and the scene without their pixels: all levels wait for the last one.
-fn encoded(mut scene: surface::Scene) -> Result<(Vec<Vec<u8>>, surface::Scene)> {
-    let pngs = encode_images(&scene)?;
-    for image in &mut scene.images {
-        image.rgba = Arc::default();
-    }
-    Ok((pngs, scene))
-}
-
-/// Writes every level alone and all in one; returns the names of the package's files.
-fn write(
-    package: &Package,
-    tree: &Tree,
-    packed: &[Packed],
-    watch: &dyn Watch,
-) -> Result<Vec<String>> {
-    let frame = &tree.model.frame;
-    let mut files = Vec::with_capacity(packed.len() + 3);
-    for level in packed {
-        let file = format!("{}.glb", level.name);
-        let extras: Value = level.extras.clone();
-        let bytes = write_glb(&level.name, &level.scene, &level.pngs, frame, extras)?;
-        package.write(&file, &bytes)?;
-        files.push(file);
-        step(watch)?;
-    }
-    let all = format!("{}.glb", tree.model.name);
-    package.write(&all, &write_combined(packed, frame)?)?;
-    files.extend([all, "report.json".into(), tree.model.name.clone() + SUFFIX]);
-    step(watch)?;
-    Ok(files)
+    let candidates = match request.page {
+        true => baker.candidates(tree.model.frame.radius),
+        false => Vec::new(),
+    };
+    Ok(Levels {
+        packed,
+        manifest,
+        shares,
+        candidates,
+    })
 }
 
 /// Loads the levels as an engine would: from their files.
 fn read_back(package: &Package, packed: &[Packed], rungs: &[Rung]) -> Result<Vec<Judged>> {
-    let pixels = |height: f64| (height.round() as u32).max(8);
     let read = |(level, rung): (&Packed, &Rung)| {
         let file = format!("{}.glb", level.name);
         let mut model = load(&package.file(&file))?;
@@ -352,11 +314,20 @@ fn read_back(package: &Package, packed: &[Packed], rungs: &[Rung]) -> Result<Vec
 }
 
 fn measure(original: &Model, file: &str, judged: &[Judged], watch: &dyn Watch) -> Result<Report> {
-    let settings = Settings {
+    judge((original, file), judged, &settings(), || step(watch))
+}
+
+/// Height of a tree at which a level is measured.
+fn pixels(height: f64) -> u32 {
+    (height.round() as u32).max(8)
+}
+
+/// The views of the report.
+fn settings() -> Settings {
+    Settings {
         azimuth_offset_deg: REPORT_OFFSET_DEG,
         ..Settings::default()
-    };
-    judge((original, file), judged, &settings, || step(watch))
+    }
 }
 
 /// The report as text.

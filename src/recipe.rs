@@ -89,6 +89,9 @@ pub struct Recipe {
     pub refine_rounds: u32,
     /// Training views of the fit and of the area match, 4 to 64.
     pub training_views: u32,
+    /// F1 that a level may lose where cards share texels on a page of half the size, a quarter and so on,
+    /// 0 to 0.2; default 0: every card has texels of its own.
+    pub sharing: f64,
     /// What is wood and what is foliage where shape and material mislead; the first rule that
     /// matches wins. Default: none.
     pub organs: Vec<OrganRule>,
@@ -147,6 +150,7 @@ impl Knobs for Recipe {
             Range::of("reassign_rounds", self.reassign_rounds, 0.0, 100.0),
             Range::of("texel_density", self.texel_density, 0.25, 4.0),
             Range::of("gutter_texels", self.gutter_texels, 0.0, 16.0),
+            Range::of("sharing", self.sharing, 0.0, 0.2),
             Range::of("samples", self.samples, 1.0, 8.0),
             Range::of("refine_rounds", self.refine_rounds, 0.0, 100.0),
             Range::of("validity_px", self.validity_px, 0.1, 64.0),
@@ -226,6 +230,7 @@ impl Recipe {
             samples: 3,
             refine_rounds: 3,
             training_views: 24,
+            sharing: 0.0,
             organs: Vec::new(),
             triangular_cards: true,
             method: Method::OptimalCut,

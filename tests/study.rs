@@ -9,7 +9,7 @@ use pleach::botany::tree::Tree;
 use pleach::describe::Describer;
 use pleach::detail::element::elements;
 use pleach::detail::optimal_distance::{TEXELS, aspects};
-use pleach::export::manifest::{FORMAT, Manifest, VERSION, Visibility};
+use pleach::export::manifest::{Card, FORMAT, Level, Manifest, VERSION, Visibility};
 use pleach::runtime::{Density, Form, Hidden, Law, Occlusion, Plain};
 use pleach::scene::Scene;
 use pleach::study::lee;
@@ -92,7 +92,7 @@ fn a_spoiled_manifest_is_refused_by_its_field() {
         spoil(&mut bad);
         refusal(&bad.to_ron().unwrap())
     };
-    let message = refusal(&text.replacen("version: 3", "version: 1", 1));
+    let message = refusal(&text.replacen(&format!("version: {VERSION}"), "version: 1", 1));
     assert!(
         message.contains("version") && message.contains('1'),
         "{message}"
@@ -103,7 +103,16 @@ fn a_spoiled_manifest_is_refused_by_its_field() {
     }
     let last = good.subtrees.len() - 1;
     type Spoil<'a> = (&'a str, &'a dyn Fn(&mut Manifest));
-    let cases: [Spoil; 12] = [
+    let cases: [Spoil; 13] = [
+        ("cards[0].copy_of", &|m| {
+            m.levels.push(Level {
+                cards: vec![Card {
+                    copy_of: Some(0),
+                    ..Card::default()
+                }],
+                ..Level::default()
+            });
+        }),
         ("representative", &|m| {
             m.subtrees[0].representative = 1;
         }),

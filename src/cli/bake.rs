@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use super::batch;
 use super::out::{print, say};
+use super::page;
 use super::progress::{Bars, catch_ctrl_c};
 use super::scene::scene;
 use crate::batch::Batch;
@@ -12,7 +13,7 @@ use crate::error::Result;
 use crate::knobs::read;
 use crate::pipeline::{Baked, Limit, Request, Wanted, bake, to_json};
 use crate::recipe::{Preset, Recipe};
-use crate::report::schema::{Bake, Level, Report};
+use crate::report::schema::{Bake, Level, Report, Sharing};
 use crate::threads::pool;
 use crate::watch::Clock;
 
@@ -57,6 +58,14 @@ pub struct Args {
     /// 3D Tiles (NAME_tileset.json).
     #[arg(long)]
     hierarchy: bool,
+    /// Let cards that look alike share texels, on a page of half the size, a quarter and so on, while a level loses no
+    /// more F1 than this; NAME_LODn_sharing.png shows which.
+    #[arg(long, value_name = "F1", num_args = 0..=1, default_missing_value = "0.01")]
+    sharing: Option<f64>,
+    /// Also write DIR.report.html, beside the package: figures and pictures of all levels, every budget's best cut, the
+    /// skeleton, where time and bytes went. Takes about as long as the bake.
+    #[arg(long)]
+    page: bool,
     /// Keep levels that left their band instead of refusing the bake.
     #[arg(long)]
     accept: bool,
@@ -102,6 +111,10 @@ pub fn run(args: Args) -> Result<()> {
     for warning in baked.warnings.iter().filter(|_| !args.quiet) {
         say(format_args!("warning: {warning}"));
     }
+    let page = match args.page {
+        true => Some(pool.install(|| page::write(&request, &baked, &took))?),
+        false => None,
+    };
     if args.json {
         let report = Report {
             bake: Some(took),
@@ -109,7 +122,8 @@ pub fn run(args: Args) -> Result<()> {
         };
         print(&(to_json(&report)? + "\n"))
     } else if !args.quiet {
-        print(&table(&baked, &took, &request))
+        let page = page.map_or(String::new(), |p| format!("{} shows it.\n", p.display()));
+        print(&(table(&baked, &took, &request) + &page))
     } else {
         Ok(())
     }
@@ -136,10 +150,12 @@ fn request(args: &Args) -> Result<Request> {
             Recipe {
                 instancing: recipe.instancing || args.instancing,
                 hierarchy: recipe.hierarchy || args.hierarchy,
+                sharing: args.sharing.unwrap_or(recipe.sharing),
                 ..recipe
             }
         },
         scene: scene(args.scene.as_deref())?,
+        page: args.page,
         force: args.force,
         accept: args.accept,
     })
@@ -184,6 +200,11 @@ fn table(baked: &Baked, took: &Bake, request: &Request) -> String {
     for level in &baked.report.levels {
         out += &line(level);
     }
+    if let Some(sharing) = &baked.report.sharing
+        && sharing.texture_bytes_with < sharing.texture_bytes_without
+    {
+        out += &shared(sharing);
+    }
     if let Some(instanced) = &baked.report.instancing {
         out += &format!(
             "\n{}: {} of {} leaves are copies of {}; {:.1} MB, written out {:.1} MB\n",
@@ -216,6 +237,28 @@ fn table(baked: &Baked, took: &Bake, request: &Request) -> String {
         out += &format!(", peak memory {:.0} MB", mib(peak));
     }
     out + ".\nE: error over that of the original moved by half a pixel; 1 is as near as that. Area: covered, over the original's.\n"
+}
+
+fn shared(sharing: &Sharing) -> String {
+    let mut out = String::from("\n");
+    for level in sharing
+        .levels
+        .iter()
+        .filter(|l| l.texture_bytes_with < l.texture_bytes_without)
+    {
+        out += &format!(
+            "level {}: {} of {} cards show pieces of others, texels {:.2} as fine; {:.1} MB of textures for {:.1}, F1 {:.3} for {:.3}\n",
+            level.level,
+            level.copies,
+            level.copies + level.tiles,
+            level.density,
+            level.texture_bytes_with as f64 / 1_048_576.0,
+            level.texture_bytes_without as f64 / 1_048_576.0,
+            level.f1_with,
+            level.f1_without,
+        );
+    }
+    out
 }
 
 fn line(level: &Level) -> String {

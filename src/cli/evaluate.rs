@@ -145,6 +145,7 @@ fn write(
         original,
         levels: &models,
         views: &settings.view_set(),
+        made: None,
     };
     let file = folder.join("report.html");
     std::fs::write(&file, page.html()?).map_err(|e| Error::io(&file, "write", e))?;

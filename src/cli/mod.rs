@@ -6,6 +6,7 @@ mod evaluate;
 mod grow;
 mod inspect;
 mod out;
+mod page;
 mod plan;
 mod progress;
 mod scene;

@@ -36,6 +36,15 @@ pub struct Cut {
     pub error: f64,
 }
 
+/// What a cut costs, and how far off it is.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Candidate {
+    /// Triangles, wood included.
+    pub triangles: u64,
+    /// Root mean square distance from the original, metres.
+    pub error_m: f64,
+}
+
 /// What pruning knows of the hierarchy.
 pub struct Pruning<'a> {
     /// The groups.

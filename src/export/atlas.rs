@@ -109,7 +109,7 @@ pub fn pack(charts: &mut [Chart]) -> Option<[u32; 2]> {
 }
 
 /// Places all charts on a page of the given size, or none.
-fn place(charts: &mut [Chart], side: [u32; 2]) -> bool {
+pub fn place(charts: &mut [Chart], side: [u32; 2]) -> bool {
     let slots = slots(charts);
     let room = u64::from(side[0]) * u64::from(side[1]);
     texels(&slots) <= room && place_slots(charts, &slots, side)

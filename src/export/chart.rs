@@ -20,6 +20,8 @@ pub enum Shape {
     Half,
     /// Those that are marked, row by row.
     Mask(Vec<bool>),
+    /// None: the card shows texels of other charts.
+    Window,
 }
 
 /// A card's place in texel space.
@@ -221,6 +223,17 @@ impl Chart {
         self.base + Vec2::new(d.dot(self.to_x), d.dot(self.to_y))
     }
 
+    /// The point of the card's plane at local texel coordinates.
+    pub fn point(&self, texel: Vec2) -> Vec3 {
+        let axes = [self.tangent, self.normal.cross(self.tangent)];
+        let [x, y] = [self.to_x, self.to_y].map(|to| Vec2::from(axes.map(|axis| to.dot(axis))));
+        let d = texel - self.base;
+        // Rows of the inverse of [x; y].
+        let determinant = x.perp_dot(y);
+        let q = Vec2::new(d.x * y.y - d.y * x.y, d.y * x.x - d.x * y.x) / determinant;
+        self.origin + axes[0] * q.x + axes[1] * q.y
+    }
+
     /// Whether the local texel (x, y) belongs to this chart.
     pub fn owns(&self, x: u32, y: u32) -> bool {
         let [w, h] = self.size;
@@ -228,13 +241,22 @@ impl Chart {
             Shape::Whole => true,
             Shape::Half => (x as f32 + 0.5) / w as f32 + (y as f32 + 0.5) / (h as f32) < 1.0,
             Shape::Mask(owned) => owned[(y * w + x) as usize],
+            Shape::Window => false,
         }
     }
 
-    /// How many texels of each row belong to the chart; they are the first ones.
+    /// How many texels of each row the card may show: up to the last one that belongs to the chart,
+    /// and all of a window's.
     pub fn row_lengths(&self) -> Vec<u32> {
-        let length = |y| (0..self.size[0]).take_while(|&x| self.owns(x, y)).count() as u32;
-        (0..self.size[1]).map(length).collect()
+        let [width, height] = self.size;
+        let length = |y| match self.shape {
+            Shape::Whole | Shape::Window => width,
+            _ => (0..width)
+                .rev()
+                .find(|&x| self.owns(x, y))
+                .map_or(0, |x| x + 1),
+        };
+        (0..height).map(length).collect()
     }
 
     /// Where the local texel (x, y) lies in the atlas.

@@ -6,7 +6,7 @@ use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
 use super::atlas::{Layout, lay_out};
-use super::chart::Chart;
+use super::chart::{Chart, Shape};
 use super::edge::bleed;
 use super::project::project;
 use super::surface::Surface;
@@ -55,40 +55,50 @@ impl Foliage {
     /// Lays out and projects all cards.
     pub fn bake(model: &Model, groups: &[CardGroup], options: BakeOptions) -> Self {
         let cards: Vec<&Card> = groups.iter().map(|g| &g.card).collect();
-        let (mut charts, size) = lay_out(&cards, options.layout);
-        let mut texels = vec![Stored::default(); (size[0] * size[1]) as usize];
-        let mut owned = vec![false; texels.len()];
+        let (charts, size) = lay_out(&cards, options.layout);
+        let mut foliage = Self::of(charts, size);
+        foliage.project(model, groups, options.samples);
+        foliage.threshold(0.5, 0);
+        foliage
+    }
+
+    /// An empty page for `charts`.
+    pub(super) fn of(charts: Vec<Chart>, size: [u32; 2]) -> Self {
+        let texels = vec![Stored::default(); (size[0] * size[1]) as usize];
+        Self {
+            owned: vec![false; texels.len()],
+            alpha: vec![0; texels.len()],
+            charts,
+            size,
+            texels,
+        }
+    }
+
+    /// Draws each card that has texels of its own; `groups` are the charts' cards.
+    pub(super) fn project(&mut self, model: &Model, groups: &[CardGroup], samples: u32) {
+        let [width, _] = self.size;
         // Some cards at a time: projections are several times as large as what is kept of them.
-        let batches = groups.chunks(BATCH).zip(charts.chunks_mut(BATCH));
-        for (groups, charts) in batches {
-            let projected: Vec<_> = groups
-                .par_iter()
-                .zip(&mut *charts)
+        for (groups, charts) in groups.chunks(BATCH).zip(self.charts.chunks(BATCH)) {
+            let own = groups.par_iter().zip(charts);
+            let projected: Vec<_> = own
+                .filter(|(_, chart)| chart.shape != Shape::Window)
                 .map(|(g, chart)| {
-                    project(model, g.triangles.iter().copied(), chart, options.samples)
+                    let drawn = project(model, g.triangles.iter().copied(), chart, samples);
+                    (chart, drawn)
                 })
                 .collect();
-            for (chart, projection) in charts.iter().zip(projected) {
+            for (chart, projection) in projected {
                 for y in 0..chart.size[1] {
                     for x in (0..chart.size[0]).filter(|&x| chart.owns(x, y)) {
                         let [ax, ay] = chart.in_atlas(x, y);
-                        let at = (ay * size[0] + ax) as usize;
+                        let at = (ay * width + ax) as usize;
                         let texel = projection.texels[(y * chart.size[0] + x) as usize];
-                        texels[at] = texel.into();
-                        owned[at] = true;
+                        self.texels[at] = texel.into();
+                        self.owned[at] = true;
                     }
                 }
             }
         }
-        let mut foliage = Self {
-            charts,
-            size,
-            texels,
-            owned,
-            alpha: Vec::new(),
-        };
-        foliage.threshold(0.5, 0);
-        foliage
     }
 
     /// Alpha 255 where the coverage reaches `t`, else `floor`.

@@ -77,6 +77,17 @@ fn of_level(index: usize, level: &Level, subtrees: usize) -> Option<(String, Str
             let mut cards = level.cards.iter().enumerate();
             cards.find_map(|(i, card)| of_card(&at(&format!("cards[{i}]")), card, subtrees))
         })
+        .or_else(|| {
+            let mut cards = level.cards.iter().enumerate();
+            let own = |tile: u32| level.cards.get(tile as usize).map(|c| c.copy_of);
+            cards.find_map(|(i, card)| match own(card.copy_of?) {
+                Some(None) => None,
+                _ => Some((
+                    at(&format!("cards[{i}].copy_of")),
+                    "it must be a card with texels of its own".into(),
+                )),
+            })
+        })
 }
 
 fn of_card(at: &str, card: &Card, subtrees: usize) -> Option<(String, String)> {

@@ -5,16 +5,14 @@ use std::sync::Arc;
 use crate::botany::model::Image;
 use crate::space::texture::{linear, srgb};
 
-/// Halves an image by a box filter until no side is longer than `most` texels: colours in linear
-/// light, weighted by alpha; other numbers (normals, roughness) as they are.
-pub fn shrink(image: &mut Image, most: u32, colored: bool) {
-    while image.width > most || image.height > most {
-        *image = if colored {
-            halved(image, linear, srgb)
-        } else {
-            halved(image, |v| f32::from(v) / 255.0, |v| (v * 255.0 + 0.5) as u8)
-        };
-    }
+/// Halves an image by a box filter: colours in linear light, weighted by alpha; other numbers (normals,
+/// roughness) as they are.
+pub fn halve(image: &mut Image, colored: bool) {
+    *image = if colored {
+        halved(image, linear, srgb)
+    } else {
+        halved(image, |v| f32::from(v) / 255.0, |v| (v * 255.0 + 0.5) as u8)
+    };
 }
 
 fn halved(image: &Image, decode: impl Fn(u8) -> f32, encode: impl Fn(f32) -> u8) -> Image {
@@ -73,7 +71,7 @@ mod tests {
             .concat()
             .into(),
         };
-        shrink(&mut image, 1, true);
+        halve(&mut image, true);
         assert_eq!(image.rgba[..], [200, 100, 50, 128]);
     }
 
@@ -87,7 +85,7 @@ mod tests {
                 height: 1,
                 rgba: Arc::new([texel(0), texel(200)].concat()),
             };
-            shrink(&mut image, 1, colored);
+            halve(&mut image, colored);
             image.rgba[0]
         };
         assert_eq!(image(false), 100);

@@ -162,7 +162,8 @@ impl Package {
     }
 }
 
-fn beside(output: &Path, ending: &str) -> PathBuf {
+/// The file beside a package's folder that is named after it.
+pub fn beside(output: &Path, ending: &str) -> PathBuf {
     let mut name = output.file_name().unwrap_or_default().to_os_string();
     name.push(ending);
     output.with_file_name(name)

@@ -65,7 +65,7 @@ pub fn refine(foliage: &Foliage, targets: &[Target], options: Refine) -> Vec<f32
             .zip(counts)
             .map(|(target, counts)| opinions(target, &counts))
             .collect();
-        let votes: Vec<Vec<f32>> = foliage
+        let votes: Vec<Vec<Votes>> = foliage
             .charts
             .par_iter()
             .zip(&rows)
@@ -81,22 +81,35 @@ pub fn refine(foliage: &Foliage, targets: &[Target], options: Refine) -> Vec<f32
             .collect();
         // Later rounds move less, so that two cards do not swap a cell for ever.
         let step = 1.0 / (round as f32 + 1.0).sqrt();
-        for (chart, votes) in foliage.charts.iter().zip(votes) {
-            for y in 0..chart.size[1] {
-                for x in 0..chart.size[0] {
-                    if !chart.owns(x, y) {
-                        continue;
-                    }
-                    let [ax, ay] = chart.in_atlas(x, y);
-                    let at = (ay * foliage.size[0] + ax) as usize;
-                    mean[at] += step * (votes[(y * chart.size[0] + x) as usize] - mean[at]);
-                    score[at] = foliage.texels[at].coverage() + options.weight * mean[at];
-                }
+        for (at, (sum, hits)) in of_page(foliage, &rows, votes).into_iter().enumerate() {
+            if foliage.owned[at] {
+                mean[at] += step * (sum / hits.max(1) as f32 - mean[at]);
+                score[at] = foliage.texels[at].coverage() + options.weight * mean[at];
             }
         }
     }
     follow_neighbours(&mut score, foliage);
     score
+}
+
+/// Sum of a texel's votes, and how many there are.
+type Votes = (f32, u32);
+
+/// The votes of all cards that show a texel.
+fn of_page(foliage: &Foliage, rows: &[Vec<u32>], votes: Vec<Vec<Votes>>) -> Vec<Votes> {
+    let mut sums: Vec<Votes> = vec![(0.0, 0); foliage.texels.len()];
+    for ((chart, rows), votes) in foliage.charts.iter().zip(rows).zip(votes) {
+        for (y, &length) in (0..).zip(rows) {
+            for x in 0..length {
+                let [ax, ay] = chart.in_atlas(x, y);
+                let all = &mut sums[(ay * foliage.size[0] + ax) as usize];
+                let (sum, hits) = votes[(y * chart.size[0] + x) as usize];
+                all.0 += sum;
+                all.1 += hits;
+            }
+        }
+    }
+    sums
 }
 
 /// Share of its neighbours' mean that a texel takes over.
@@ -124,6 +137,26 @@ fn follow_neighbours(score: &mut [f32], foliage: &Foliage) {
             }
         });
     }
+}
+
+/// F1 of the cards and of what is there beside them against the original, mean over the views; a
+/// texel is opaque from half on.
+pub fn f1(foliage: &Foliage, targets: &[Target]) -> f64 {
+    let on: Vec<bool> = foliage.alpha.iter().map(|&a| a >= 128).collect();
+    let rows: Vec<Vec<u32>> = foliage.charts.iter().map(Chart::row_lengths).collect();
+    let of_view = |target: &Target| {
+        let counts = count(foliage, &rows, target, &on);
+        let cells = target.wanted.iter().zip(&target.taken).zip(counts);
+        let (mut both, mut any) = (0u64, 0u64);
+        for ((&wanted, &taken), count) in cells {
+            let covered = taken || count > 0;
+            both += 2 * u64::from(wanted && covered);
+            any += u64::from(wanted) + u64::from(covered);
+        }
+        both as f64 / any.max(1) as f64
+    };
+    let views: Vec<f64> = targets.par_iter().map(of_view).collect();
+    views.iter().sum::<f64>() / views.len().max(1) as f64
 }
 
 /// How many opaque texels each cell sees, at most 255.
@@ -162,7 +195,7 @@ fn vote(
     targets: &[&Target],
     opinions: &[Vec<[f32; 2]>],
     on: &[bool],
-) -> Vec<f32> {
+) -> Vec<Votes> {
     let texels = (chart.size[0] * chart.size[1]) as usize;
     let mut sums = vec![(0.0f32, 0u32); texels];
     let mut own = vec![false; texels];
@@ -180,8 +213,7 @@ fn vote(
             *hits += 1;
         });
     }
-    let mean = |&(sum, hits): &(f32, u32)| sum / hits.max(1) as f32;
-    sums.iter().map(mean).collect()
+    sums
 }
 
 /// Visits every cell whose centre the card covers, with the texel that lies there; `rows` are the

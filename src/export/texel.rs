@@ -34,6 +34,11 @@ impl Stored {
         f32::from(self.coverage) / 255.0
     }
 
+    /// Sets [`Stored::coverage`].
+    pub fn set_coverage(&mut self, share: f32) {
+        self.coverage = (share.clamp(0.0, 1.0) * 255.0 + 0.5) as u8;
+    }
+
     /// Mean linear colour of the covered part.
     pub fn color(&self) -> Vec3 {
         Vec3::from(self.color.map(|c| f32::from(c) / 65_535.0))

@@ -6,9 +6,9 @@ use super::{Baker, Level, LevelRequest};
 use crate::detail::level::LevelPlan;
 use crate::error::Result;
 use crate::export::atlas::Layout;
+use crate::export::enough::enough;
 use crate::export::foliage::{self, BakeOptions, Foliage};
 use crate::export::matching::{AreaGoal, CONTRAST_GUESS, LevelScene, Matched, match_area};
-use crate::export::mip::shrink;
 use crate::export::original::{Original, camera};
 use crate::export::refine::{Refine, refine};
 use crate::export::surface::{Scene, Surface, scene_of_wood};
@@ -36,11 +36,15 @@ const WOOD_TOLERANCE: f64 = 0.005;
 
 /// A plan with its wood and texels.
 pub struct Fitted {
-    request: LevelRequest,
-    plan: LevelPlan,
-    wood: Scene,
-    foliage: Foliage,
-    matched: Matched,
+    pub(super) request: LevelRequest,
+    pub(super) plan: LevelPlan,
+    pub(super) wood: Scene,
+    pub(super) foliage: Foliage,
+    pub(super) matched: Matched,
+    /// Texels a normalised unit.
+    pub(super) density: f32,
+    /// What the fit wants of each texel; kept only for sharing.
+    pub(super) score: Vec<f32>,
 }
 
 impl Baker<'_> {
@@ -52,14 +56,13 @@ impl Baker<'_> {
         watch: &dyn Watch,
     ) -> Result<Fitted> {
         let request = request.no_nearer_than(self.rms_error(&plan), self.original.height);
-        let density = request.height_texels / self.original.height * self.recipe.texel_density;
         part(watch, "project")?;
         let mut foliage = Foliage::bake(
             &self.tree.model,
             &plan.cards,
             BakeOptions {
                 layout: Layout {
-                    density,
+                    density: self.density(request),
                     pad: self.recipe.gutter_texels,
                     packer: self.recipe.packer,
                 },
@@ -67,9 +70,7 @@ impl Baker<'_> {
             },
         );
         let goal = self.goal(request);
-        // Cells about as large as texels: finer ones cost as their square, and no texel can follow.
-        let samples = self.original.height_samples() / request.height_texels;
-        let pool = samples.round().clamp(2.0, 4.0) as u32;
+        let pool = self.pool(request);
         // Where the wood alone covers more than the original, no alpha can make up for it (bare
         // trees): then the tubes become thinner, and the cards are fitted again.
         let mut radius_scale = 1.0f32;
@@ -77,16 +78,16 @@ impl Baker<'_> {
         let mut guess = CONTRAST_GUESS;
         loop {
             part(watch, "wood")?;
-            let wood = self.wood(&plan, request.height_px, radius_scale);
+            let wood = self.wood(&plan, request, radius_scale);
             let taken = merge_wood(&wood);
             let targets = self.original.targets(pool, Some(&wood_scene(&taken)));
             part(watch, "fit texels")?;
-            let options = Refine {
-                rounds: self.recipe.refine_rounds,
-                weight: 1.0,
-            };
-            let score = refine(&foliage, &targets, options);
+            let score = refine(&foliage, &targets, self.refining());
             part(watch, "match area")?;
+            let kept = match self.recipe.sharing > 0.0 {
+                true => score.clone(),
+                false => Vec::new(),
+            };
             let matched = match_area(&mut foliage, score, &wood.surfaces, &goal, guess);
             tries += 1;
             guess = matched.contrast;
@@ -98,14 +99,35 @@ impl Baker<'_> {
                     wood,
                     foliage,
                     matched,
+                    density: self.density(request),
+                    score: kept,
                 });
             }
             radius_scale /= over.min(1.25) as f32;
         }
     }
 
+    /// Texels a normalised unit.
+    pub(super) fn density(&self, request: LevelRequest) -> f32 {
+        request.height_texels / self.original.height * self.recipe.texel_density
+    }
+
+    /// Samples a cell of the targets: cells about as large as texels; finer ones cost as their
+    /// square, and no texel can follow.
+    pub(super) fn pool(&self, request: LevelRequest) -> u32 {
+        let samples = self.original.height_samples() / request.height_texels;
+        samples.round().clamp(2.0, 4.0) as u32
+    }
+
+    pub(super) fn refining(&self) -> Refine {
+        Refine {
+            rounds: self.recipe.refine_rounds,
+            weight: 1.0,
+        }
+    }
+
     /// What the level should cover where it starts, and from afar.
-    fn goal(&self, request: LevelRequest) -> AreaGoal {
+    pub(super) fn goal(&self, request: LevelRequest) -> AreaGoal {
         let areas = self.original.areas();
         let seen = |pixels: f32, every: usize| -> (Vec<Camera>, f64) {
             let unit = pixels / self.original.height;
@@ -128,7 +150,7 @@ impl Baker<'_> {
     }
 
     /// The wood that the plan draws as geometry, its textures no finer than the level needs.
-    fn wood(&self, plan: &LevelPlan, height_px: f32, radius_scale: f32) -> Scene {
+    fn wood(&self, plan: &LevelPlan, request: LevelRequest, radius_scale: f32) -> Scene {
         let mut chosen = vec![None; self.wood.len()];
         for &(element, choice) in &plan.tubes {
             if let Some(chain) = self.elements[element as usize].chain {
@@ -137,11 +159,14 @@ impl Baker<'_> {
         }
         let mesh = self.wood.build(&chosen, radius_scale);
         let mut scene = scene_of_wood(&self.tree.model, &mesh);
-        let most = (height_px as u32).next_power_of_two().clamp(64, 2048);
-        let colored = scene.colored_images();
-        for (image, colored) in scene.images.iter_mut().zip(colored) {
-            shrink(image, most, colored);
-        }
+        let most = (request.height_px as u32)
+            .next_power_of_two()
+            .clamp(64, 2048);
+        enough(
+            &mut scene,
+            request.height_texels / self.original.height,
+            most,
+        );
         scene
     }
 }
@@ -183,11 +208,13 @@ impl Fitted {
             matched: self.matched,
             charts: self.foliage.charts,
             atlas: self.foliage.size,
+            density: self.density,
+            shared: Vec::new(),
         }
     }
 }
 
-fn merge_wood(scene: &Scene) -> Surface {
+pub(super) fn merge_wood(scene: &Scene) -> Surface {
     let mut out = Surface::default();
     for s in &scene.surfaces {
         let base = out.positions.len() as u32;
@@ -199,7 +226,7 @@ fn merge_wood(scene: &Scene) -> Surface {
     out
 }
 
-fn wood_scene(surface: &Surface) -> raster::Scene<'_> {
+pub(super) fn wood_scene(surface: &Surface) -> raster::Scene<'_> {
     const OPAQUE: [raster::Material; 1] = [raster::Material {
         texture: None,
         uv_set: 0,

@@ -1,9 +1,11 @@
 //! One level of a package: which wood and cards draw it, their texels, and its covered area.
 
 mod fit;
+mod share;
 
 use glam::Vec3;
 
+use crate::botany::model::Image;
 use crate::botany::tree::Tree;
 use crate::cloud::{Occlusion, Outline};
 use crate::detail::adapt::AdaptOptions;
@@ -11,12 +13,13 @@ use crate::detail::adaptive_level::adaptive_level;
 use crate::detail::element::{Element, mean_radius};
 use crate::detail::level::{LevelPlan, Planner};
 use crate::detail::merge::Hierarchy;
-use crate::detail::optimal_cut::{Choice, Pruning};
+use crate::detail::optimal_cut::{Candidate, Choice, Pruning};
 use crate::detail::reassign::Reassign;
 use crate::detail::whole_tree::{crossed_quads, level_cards, whole_tree};
 use crate::detail::wood::{Wood, WoodOption};
 use crate::error::Result;
 use crate::export::chart::Chart;
+use crate::export::foliage::IMAGES;
 use crate::export::matching::Matched;
 use crate::export::original::Original;
 use crate::export::surface::{Scene, scene_of_model};
@@ -101,6 +104,19 @@ pub struct Level {
     pub charts: Vec<Chart>,
     /// Size of the atlas in texels.
     pub atlas: [u32; 2],
+    /// Texels a normalised unit that were asked for.
+    pub density: f32,
+    /// The same level with cards that share texels, the fewest texels first; empty where the recipe asks
+    /// for none or none is good enough.
+    pub shared: Vec<Level>,
+}
+
+impl Level {
+    /// The page of its cards: base colour with alpha.
+    pub fn page(&self) -> Option<&Image> {
+        let first = self.scene.images.len().checked_sub(IMAGES.len())?;
+        self.scene.images.get(first)
+    }
 }
 
 /// Where a tree is this high, in pixels, no error of it is seen any more.
@@ -125,7 +141,7 @@ impl Baker<'_> {
         if self.recipe.method == Method::CrossedQuads {
             let count = (request.triangles / 2).clamp(1, MOST_CROSSED) as usize;
             let plan = crossed_quads(&self.tree.model, self.elements, count);
-            return Ok(self.fit(plan, request, watch)?.level());
+            return self.finished(self.fit(plan, request, watch)?, watch);
         }
         if request.triangles >= self.tree.model.triangles.len() as u64 {
             return Ok(self.original_itself(request));
@@ -137,12 +153,12 @@ impl Baker<'_> {
                 &self.radii(),
                 request.triangles,
             );
-            return Ok(self.fit(plan, request, watch)?.level());
+            return self.finished(self.fit(plan, request, watch)?, watch);
         };
         let made = self.fit(plan, request, watch)?;
         let least = made.least_view(self.original);
         if least >= LEAST_VIEW {
-            return Ok(made.level());
+            return self.finished(made, watch);
         }
         // Curtains of weeping twigs have upright planes, and seen from above these are lines.
         part(watch, "cut")?;
@@ -150,9 +166,9 @@ impl Baker<'_> {
             Some(plan) => {
                 let other = self.fit(plan, request, watch)?;
                 let better = other.least_view(self.original) > least;
-                Ok(if better { other } else { made }.level())
+                self.finished(if better { other } else { made }, watch)
             }
-            None => Ok(made.level()),
+            None => self.finished(made, watch),
         }
     }
 
@@ -166,6 +182,8 @@ impl Baker<'_> {
             matched: Matched::default(),
             charts: Vec::new(),
             atlas: [0; 2],
+            density: 0.0,
+            shared: Vec::new(),
         }
     }
 
@@ -257,6 +275,32 @@ impl Baker<'_> {
             choices: &choices,
         };
         pruning.cut_within(self.area() * length * length).triangles
+    }
+
+    /// Every budget's best cut, from one triangle up, for trees whose normalised unit is so many metres.
+    pub fn candidates(&self, unit_m: f64) -> Vec<Candidate> {
+        let choices = self.choices();
+        let pruning = Pruning {
+            hierarchy: self.hierarchy,
+            card_error: &self.hierarchy.error,
+            card_triangles: if self.recipe.triangular_cards { 1 } else { 2 },
+            choices: &choices,
+        };
+        // Multipliers by factors of two: two cuts of which one costs a few percent more look alike.
+        let mut out: Vec<Candidate> = Vec::new();
+        for exponent in -120..40 {
+            let cut = pruning.at(f64::from(exponent).exp2());
+            if out
+                .last()
+                .is_none_or(|last| last.triangles != cut.triangles)
+            {
+                out.push(Candidate {
+                    triangles: cut.triangles,
+                    error_m: (cut.error / self.area().max(1e-30)).sqrt() * unit_m,
+                });
+            }
+        }
+        out
     }
 
     fn choices(&self) -> Vec<Vec<Choice>> {

@@ -26,7 +26,7 @@ pub use cost::{draw_calls, texture_bytes};
 pub use drawable::Drawable;
 pub use evaluate::{Settings, evaluate};
 pub use judge::{Judged, heights, judge};
-pub use page::Content;
+pub use page::{Content, Made, Making, Recognised};
 pub use reference::Reference;
 pub use silhouette::{Agreement, agreement};
 pub use start::start_height_px;

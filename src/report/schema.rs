@@ -16,7 +16,7 @@ pub struct Report {
     pub original: Option<Level>,
     /// The levels, nearest first.
     pub levels: Vec<Level>,
-    /// What the sharing of self-similar sub-trees saves and costs; absent where nothing was baked.
+    /// What sharing of texels between cards saves and costs; absent where nothing was baked.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub sharing: Option<Sharing>,
     /// Level 0 as prototypes and copies; absent where that was not asked for or no leaf repeats.
@@ -221,16 +221,40 @@ pub struct Change {
     pub psnr_db: Figure,
 }
 
-/// What sharing of self-similar sub-trees saves and costs.
+/// What sharing of texels between cards that look alike saves and costs, over all levels but level 0; with
+/// and without are the same where the recipe asks for none.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Sharing {
-    /// Texture bytes of all levels with sharing.
+    /// Texture bytes of these levels with sharing.
     pub texture_bytes_with: u64,
-    /// Texture bytes of all levels without.
+    /// Texture bytes without.
     pub texture_bytes_without: u64,
-    /// Mean F1 with sharing.
+    /// Mean of their F1 where they start, supersampled, with sharing.
     pub f1_with: f64,
     /// Mean F1 without.
+    pub f1_without: f64,
+    /// The levels, nearest first.
+    pub levels: Vec<SharedLevel>,
+}
+
+/// What sharing does to one level.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct SharedLevel {
+    /// Number of the level.
+    pub level: u32,
+    /// Cards with texels of their own.
+    pub tiles: u64,
+    /// Cards that show a piece of these.
+    pub copies: u64,
+    /// Texels along a line over those that the level has without sharing; 1 where nothing is shared.
+    pub density: f64,
+    /// Bytes of all its textures with sharing.
+    pub texture_bytes_with: u64,
+    /// Bytes without.
+    pub texture_bytes_without: u64,
+    /// F1 where it starts, supersampled, mean over views, with sharing.
+    pub f1_with: f64,
+    /// F1 without.
     pub f1_without: f64,
 }
 

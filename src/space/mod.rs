@@ -12,6 +12,8 @@ pub mod grid;
 pub mod hull;
 mod min_triangle;
 pub mod polyline;
+#[cfg(feature = "bake")]
+pub mod random;
 pub mod raster;
 pub mod root;
 pub mod sha256;

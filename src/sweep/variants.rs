@@ -53,6 +53,9 @@ pub fn variants() -> Vec<Variant> {
     for n in [0.001, 0.1] {
         alone(format!("locality {n}"), &|r| r.locality = n);
     }
+    for n in [0.01, 0.02] {
+        alone(format!("sharing {n}"), &|r| r.sharing = n);
+    }
     alone("rectangular cards".into(), &|r| r.triangular_cards = false);
     alone("adaptive loop".into(), &|r| r.method = Method::AdaptiveLoop);
     out

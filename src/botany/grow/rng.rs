@@ -1,48 +1,19 @@
-//! Random numbers and transcendental functions that are the same on every machine.
+//! Random quantities and transcendental functions that are the same on every machine.
 //!
-//! The generator is SplitMix64 (Steele, Lea, Flood, "Fast splittable pseudorandom number
-//! generators", OOPSLA 2014). Sines and powers use only +, -, *, /, which IEEE 754 fixes to the
+//! Sines and powers use only +, -, *, /, which IEEE 754 fixes to the
 //! last bit; the standard library's call the platform's libm, which it does not.
 
 use std::f64::consts::{FRAC_PI_2, LN_2, SQRT_2};
 
 use glam::Vec3;
 
+pub(super) use crate::space::random::Rng;
+
 /// A value and how far it varies to either side.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Vary(pub f32, pub f32);
 
-/// SplitMix64.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Rng(u64);
-
 impl Rng {
-    /// The stream of random numbers number `stream` under a seed.
-    pub fn new(seed: u64, stream: u64) -> Self {
-        let mut rng = Self(seed ^ stream.wrapping_mul(0xD1B5_4A32_D192_ED03));
-        rng.bits();
-        rng
-    }
-
-    /// 64 random bits.
-    pub fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^ (z >> 31)
-    }
-
-    /// From 0 to 1, 1 excluded.
-    pub fn unit(&mut self) -> f32 {
-        (self.bits() >> 40) as f32 / (1u64 << 24) as f32
-    }
-
-    /// From -1 to 1.
-    pub fn sway(&mut self) -> f32 {
-        2.0 * self.unit() - 1.0
-    }
-
     /// The value, varied.
     pub fn vary(&mut self, value: Vary) -> f32 {
         value.0 + value.1 * self.sway()
@@ -138,13 +109,5 @@ mod tests {
             assert!((f64::from(pow(base, exponent)) / expected - 1.0).abs() < 1e-6);
         }
         assert_eq!(pow(0.0, 2.0), 0.0);
-    }
-
-    #[test]
-    fn splitmix_matches_its_reference() {
-        // First outputs of the reference implementation for seed 1234567.
-        let mut rng = Rng(1_234_567);
-        assert_eq!(rng.bits(), 6_457_827_717_110_365_317);
-        assert_eq!(rng.bits(), 3_203_168_211_198_807_973);
     }
 }

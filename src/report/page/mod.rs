@@ -3,6 +3,7 @@
 //! The page states what the files on disk look like: it draws them anew. It holds style, script
 //! and pictures itself and asks for nothing else.
 
+mod making;
 mod picture;
 mod plot;
 mod tables;
@@ -12,6 +13,7 @@ use base64::engine::general_purpose::STANDARD;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use rayon::prelude::*;
 
+pub use self::making::{Made, Making, Recognised};
 use self::picture::{AGREEMENT, Pair, flip_color, page as atlas_page, pair};
 use self::plot::{Plot, Series, mark};
 use super::schema::{Level, Report};
@@ -32,6 +34,8 @@ pub struct Content<'a> {
     pub levels: &'a [&'a Model],
     /// The views that the figures are of.
     pub views: &'a [View],
+    /// How the levels were made, where a bake tells.
+    pub made: Option<Made<'a>>,
 }
 
 /// Trees up to this height in pixels are shown enlarged, too.
@@ -95,6 +99,9 @@ impl Content<'_> {
                             ul {
                                 li { a href="#levels" { "Figures" } }
                                 li { a href="#diagrams" { "Diagrams" } }
+                                @if self.made.is_some() {
+                                    li { a href="#making" { "How they were made" } }
+                                }
                                 @for level in &self.report.levels {
                                     li { a href={ "#level-" (level.level) } { "Level " (level.level) } }
                                 }
@@ -107,6 +114,7 @@ impl Content<'_> {
                             (tables::changes(self.report))
                         }
                         (self.diagrams())
+                        @if let Some(made) = self.made { (making::sections(made)) }
                         @for section in &sections { (section) }
                         p class="quiet" {
                             "Made by pleach " (env!("CARGO_PKG_VERSION"))

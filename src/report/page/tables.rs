@@ -173,7 +173,7 @@ pub fn changes(report: &Report) -> Markup {
 }
 
 /// A table that scrolls by itself where it is too wide; reachable by keyboard.
-fn table(caption: &str, heads: &[&str], body: Markup) -> Markup {
+pub fn table(caption: &str, heads: &[&str], body: Markup) -> Markup {
     html! {
         div class="scroll" tabindex="0" role="region" aria-label=(caption.split_once(['.', ',']).map_or(caption, |c| c.0)) {
             table {

@@ -1,0 +1,79 @@
+//! `bake --page`: one file that shows what was baked and how, beside the package.
+
+use std::path::PathBuf;
+
+use crate::botany::Model;
+use crate::botany::load::load;
+use crate::error::{Error, Result};
+use crate::export::package::beside;
+use crate::pipeline::{Baked, Request};
+use crate::report::schema::{Bake, Report};
+use crate::report::{Content, Made, Settings, evaluate};
+
+/// Follows the folder's name in that of the page.
+pub const PAGE: &str = ".report.html";
+
+/// Heights of the tree at which all levels are compared, pixels.
+const HEIGHTS_PX: [u32; 2] = [256, 64];
+
+/// Evaluates the levels of a package and writes the page; returns where.
+///
+/// # Errors
+/// Those of loading the files, and [`Error::Io`].
+pub fn write(request: &Request, baked: &Baked, took: &Bake) -> Result<PathBuf> {
+    let original = load(&request.input)?;
+    let rows = &baked.report.levels;
+    let levels: Vec<Model> = rows
+        .iter()
+        .map(|row| load(&request.output.join(&row.file)))
+        .collect::<Result<_>>()?;
+    let settings = Settings {
+        heights_px: HEIGHTS_PX.to_vec(),
+        own_heights_px: rows
+            .iter()
+            .map(|row| row.sizes.first().map(|s| s.height_px))
+            .collect(),
+        azimuth_offset_deg: 11.0,
+        client: true,
+        appearance: true,
+        ..Settings::default()
+    };
+    let named: Vec<(&Model, &str)> = levels
+        .iter()
+        .zip(rows)
+        .map(|(model, row)| (model, row.file.as_str()))
+        .collect();
+    let file = request.input.file_name().unwrap_or_default();
+    let report = Report {
+        sharing: baked.report.sharing.clone(),
+        ..evaluate((&original, &file.to_string_lossy()), &named, &settings)
+    };
+    let files: Vec<(String, u64)> = baked
+        .files
+        .iter()
+        .map(|name| {
+            let path = request.output.join(name);
+            let about = std::fs::metadata(&path).map_err(|e| Error::io(&path, "read", e))?;
+            Ok((name.clone(), about.len()))
+        })
+        .collect::<Result<_>>()?;
+    let models: Vec<&Model> = levels.iter().collect();
+    let page = Content {
+        report: &report,
+        original: &original,
+        levels: &models,
+        views: &settings.view_set(),
+        made: Some(Made {
+            making: &baked.making,
+            took,
+            files: &files,
+        }),
+    };
+    let html = page.html()?;
+    let file = beside(&request.output, PAGE);
+    let draft = beside(&request.output, ".report.html.draft");
+    let fail = |e| Error::io(&file, "write", e);
+    std::fs::write(&draft, html).map_err(fail)?;
+    std::fs::rename(&draft, &file).map_err(fail)?;
+    Ok(file)
+}

@@ -1,0 +1,89 @@
+//! The contact sheet: tiles with the cards that show pieces of them.
+
+use std::sync::Arc;
+
+use glam::Vec2;
+
+use super::owners;
+use crate::botany::model::Image;
+use crate::export::chart::{Chart, Shape};
+use crate::space::hull;
+
+/// Side of a picture, pixels.
+const CELL: u32 = 96;
+
+/// Pictures in a row: a tile, and as many of its copies.
+const COLUMNS: u32 = 12;
+
+/// Most rows.
+const ROWS: usize = 32;
+
+const PAPER: [u8; 4] = [255; 4];
+const CARD: [u8; 4] = [214, 222, 232, 255];
+const TILE: [u8; 4] = [232, 222, 196, 255];
+
+/// One row for each tile that others show pieces of, most copies first: the tile on sand, then
+/// copies on blue, each in the shape of its card and as large as it fits. `page` is the level's
+/// base colour with alpha.
+pub fn sheet(charts: &[Chart], page: &Image) -> Image {
+    let mut copies: Vec<(u32, Vec<u32>)> = Vec::new();
+    for (copy, owner) in (0..).zip(owners(charts, [page.width, page.height])) {
+        let Some(owner) = owner else { continue };
+        match copies.iter_mut().find(|(tile, _)| *tile == owner) {
+            Some((_, copies)) => copies.push(copy),
+            None => copies.push((owner, vec![copy])),
+        }
+    }
+    copies.sort_by_key(|(tile, copies)| (std::cmp::Reverse(copies.len()), *tile));
+    copies.truncate(ROWS);
+    let widest = copies
+        .iter()
+        .map(|(_, copies)| copies.len() as u32 + 1)
+        .max();
+    let columns = widest.unwrap_or(1).min(COLUMNS);
+    let (width, height) = (CELL * columns, CELL * copies.len().max(1) as u32);
+    let mut rgba = PAPER.repeat((width * height) as usize);
+    for (row, (tile, copies)) in (0..).zip(&copies) {
+        let cards = std::iter::once(tile).chain(copies).take(columns as usize);
+        for (column, &card) in (0..).zip(cards) {
+            let chart = &charts[card as usize];
+            draw(chart, page, |x, y, pixel| {
+                let at = ((row * CELL + y) * width + column * CELL + x) as usize * 4;
+                rgba[at..at + 4].copy_from_slice(&pixel);
+            });
+        }
+    }
+    Image {
+        name: "sharing".into(),
+        width,
+        height,
+        rgba: Arc::new(rgba),
+    }
+}
+
+/// Draws a card, seen from its front, in a cell.
+fn draw(chart: &Chart, page: &Image, mut put: impl FnMut(u32, u32, [u8; 4])) {
+    let axes = [chart.tangent, chart.normal.cross(chart.tangent)];
+    let flat = |i: usize| Vec2::from(axes.map(|a| (chart.corners[i] - chart.origin).dot(a)));
+    let outline: Vec<Vec2> = (0..chart.corners.len()).map(flat).collect();
+    let low = outline.iter().fold(Vec2::MAX, |m, &c| m.min(c));
+    let high = outline.iter().fold(Vec2::MIN, |m, &c| m.max(c));
+    let scale = (high - low).max_element().max(1e-9) / (CELL - 4) as f32;
+    let ground = if chart.shape == Shape::Window {
+        CARD
+    } else {
+        TILE
+    };
+    for (x, y) in (0..CELL).flat_map(|y| (0..CELL).map(move |x| (x, y))) {
+        let offset = Vec2::new(x as f32, y as f32) + 0.5 - CELL as f32 / 2.0;
+        let q = (low + high) / 2.0 + offset * scale;
+        if !hull::holds(&outline, q, 0.0) {
+            continue;
+        }
+        let texel = chart.atlas_point(chart.origin + axes[0] * q.x + axes[1] * q.y);
+        let (tx, ty) = (texel.x.max(0.0) as u32, texel.y.max(0.0) as u32);
+        let at = (ty.min(page.height - 1) * page.width + tx.min(page.width - 1)) as usize * 4;
+        let [r, g, b, a] = [0, 1, 2, 3].map(|k| page.rgba[at + k]);
+        put(x, y, if a >= 128 { [r, g, b, 255] } else { ground });
+    }
+}

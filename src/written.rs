@@ -1,0 +1,72 @@
+//! What levels become on their way to the package's files.
+
+use std::sync::Arc;
+
+use serde_json::Value;
+
+use crate::botany::tree::Tree;
+use crate::error::Result;
+use crate::export::combined::{Packed, write_combined};
+use crate::export::gltf::write_glb;
+use crate::export::manifest::SUFFIX;
+use crate::export::package::Package;
+use crate::export::png::encode_images;
+use crate::export::surface::Scene;
+use crate::report::schema::SharedLevel;
+use crate::watch::{Watch, step};
+
+/// What a level shares, and the contact sheet of it.
+pub type Share = (SharedLevel, Option<Vec<u8>>);
+
+/// A scene's images as PNG, and the scene without their pixels: all levels wait for the last one.
+pub fn encoded(mut scene: Scene) -> Result<(Vec<Vec<u8>>, Scene)> {
+    let pngs = encode_images(&scene)?;
+    for image in &mut scene.images {
+        image.rgba = Arc::default();
+    }
+    Ok((pngs, scene))
+}
+
+/// Writes every level alone and all in one; returns the names of the package's files.
+pub fn write(
+    package: &Package,
+    tree: &Tree,
+    packed: &[Packed],
+    watch: &dyn Watch,
+) -> Result<Vec<String>> {
+    let frame = &tree.model.frame;
+    let mut files = Vec::with_capacity(packed.len() + 3);
+    for level in packed {
+        let file = format!("{}.glb", level.name);
+        let extras: Value = level.extras.clone();
+        let bytes = write_glb(&level.name, &level.scene, &level.pngs, frame, extras)?;
+        package.write(&file, &bytes)?;
+        files.push(file);
+        step(watch)?;
+    }
+    let all = format!("{}.glb", tree.model.name);
+    package.write(&all, &write_combined(packed, frame)?)?;
+    files.extend([all, "report.json".into(), tree.model.name.clone() + SUFFIX]);
+    step(watch)?;
+    Ok(files)
+}
+
+/// Writes the contact sheets of what levels share.
+pub fn sheets(
+    package: &Package,
+    packed: &[Packed],
+    shares: Vec<Share>,
+    files: &mut Vec<String>,
+) -> Result<Vec<SharedLevel>> {
+    let mut out = Vec::with_capacity(shares.len());
+    for ((told, sheet), level) in shares.into_iter().zip(packed) {
+        if let Some(sheet) = sheet {
+            let file = format!("{}_sharing.png", level.name);
+            package.write(&file, &sheet)?;
+            // The manifest stays last: who finds it finds all the others.
+            files.insert(files.len() - 1, file);
+        }
+        out.push(told);
+    }
+    Ok(out)
+}

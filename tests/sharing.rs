@@ -1,0 +1,131 @@
+//! `bake --sharing`: fewer texels within the F1 that the user allows.
+
+use std::path::Path;
+
+use pleach::botany::grow::{Options, Species, grow};
+use pleach::botany::load::load;
+use pleach::export::manifest::{Manifest, SUFFIX};
+use pleach::pipeline::{Baked, Request, Wanted, bake};
+use pleach::recipe::Recipe;
+use pleach::report::texture_bytes;
+use pleach::scene::Scene;
+use pleach::threads::pool;
+use pleach::watch::Unwatched;
+
+/// A baked oak in `folder`; a level may lose `sharing` of F1.
+fn baked(folder: &Path, sharing: f64, threads: usize) -> Baked {
+    std::fs::create_dir_all(folder).unwrap();
+    let options = Options {
+        leaves: Some(600),
+        ..Options::default()
+    };
+    let input = folder.join("tree.glb");
+    std::fs::write(
+        &input,
+        grow(&Species::named("oak").unwrap(), &options).unwrap().glb,
+    )
+    .unwrap();
+    let request = Request {
+        input,
+        output: folder.join("out"),
+        wanted: Wanted::Levels(2),
+        recipe: Recipe {
+            sharing,
+            ..Recipe::draft()
+        },
+        scene: Scene {
+            screen_height_px: 256,
+            heights_px: vec![160.0, 48.0],
+            ..Scene::default()
+        },
+        accept: true,
+        ..Request::default()
+    };
+    pool(threads)
+        .unwrap()
+        .install(|| bake(&request, &Unwatched))
+        .unwrap()
+}
+
+fn bytes(folder: &Path, baked: &Baked) -> Vec<Vec<u8>> {
+    let read = |file: &String| std::fs::read(folder.join("out").join(file)).unwrap();
+    baked.files.iter().map(read).collect()
+}
+
+#[test]
+fn levels_with_shared_texels_are_smaller_and_nearly_as_good() {
+    const MOST: f64 = 0.02;
+    let home = tempfile::tempdir().unwrap();
+    let (plain, shared) = (home.path().join("plain"), home.path().join("shared"));
+    let (without, with) = (baked(&plain, 0.0, 1), baked(&shared, MOST, 1));
+
+    // Nothing is asked for: the same figures twice.
+    let told = without.report.sharing.unwrap();
+    assert_eq!(told.texture_bytes_with, told.texture_bytes_without);
+    assert_eq!(told.f1_with, told.f1_without);
+    assert!(
+        told.levels
+            .iter()
+            .all(|l| l.copies == 0 && l.density == 1.0 && l.tiles > 0)
+    );
+
+    let sharing = with.report.sharing.as_ref().unwrap();
+    assert_eq!(sharing.texture_bytes_without, told.texture_bytes_without);
+    assert!((sharing.f1_without - told.f1_without).abs() < 1e-9);
+    assert!(sharing.f1_with >= sharing.f1_without - MOST);
+    assert!(
+        2 * sharing.texture_bytes_with <= sharing.texture_bytes_without,
+        "{sharing:?}"
+    );
+    assert!(sharing.levels.iter().any(|l| l.copies > 0), "{sharing:?}");
+
+    let file = shared.join("out").join(format!("tree{SUFFIX}"));
+    let manifest = Manifest::from_ron(&std::fs::read_to_string(&file).unwrap(), &file).unwrap();
+    for (told, level) in sharing.levels.iter().zip(&manifest.levels[1..]) {
+        // What is told is what the files hold.
+        let model = load(&shared.join("out").join(&level.file)).unwrap();
+        assert_eq!(texture_bytes(&model), told.texture_bytes_with);
+        let copies = level.cards.iter().filter_map(|c| c.copy_of);
+        for tile in copies.clone() {
+            assert_eq!(level.cards[tile as usize].copy_of, None);
+        }
+        assert_eq!(copies.count() as u64, told.copies);
+        let sheet = with
+            .files
+            .contains(&format!("tree_LOD{}_sharing.png", told.level));
+        assert_eq!(sheet, told.copies > 0);
+        // Texture coordinates of copies stay on the page.
+        let uvs = model.uvs[0].iter();
+        let beyond = uvs.filter(|uv| uv.min_element() < -1e-4 || uv.max_element() > 1.0001);
+        let bark = 4 * model.uvs[0].len() / 5;
+        assert!(beyond.count() <= bark);
+    }
+}
+
+#[test]
+fn what_no_level_can_afford_changes_no_file_and_is_said() {
+    let home = tempfile::tempdir().unwrap();
+    let (plain, shared) = (home.path().join("plain"), home.path().join("shared"));
+    let (without, with) = (baked(&plain, 0.0, 2), baked(&shared, 1e-9, 2));
+    let said = with.warnings.iter().any(|w| w.contains("keeps its page"));
+    assert!(said, "{:?}", with.warnings);
+    let kept = |baked: &Baked| -> Vec<String> {
+        let levels = baked.files.iter().filter(|f| f.ends_with(".glb"));
+        levels.cloned().collect()
+    };
+    assert_eq!(kept(&without), kept(&with));
+    let changed = with.report.sharing.as_ref().unwrap().levels.iter();
+    for level in changed.filter(|l| l.texture_bytes_with == l.texture_bytes_without) {
+        let file = format!("tree_LOD{}.glb", level.level);
+        let [a, b] = [&plain, &shared].map(|f| std::fs::read(f.join("out").join(&file)).unwrap());
+        assert_eq!(a, b);
+    }
+}
+
+#[test]
+fn the_same_bytes_on_one_thread_and_on_two() {
+    let home = tempfile::tempdir().unwrap();
+    let (one, two) = (home.path().join("one"), home.path().join("two"));
+    let [a, b] = [(&one, 1), (&two, 2)].map(|(f, threads)| bytes(f, &baked(f, 0.02, threads)));
+    assert_eq!(a, b);
+}
