@@ -58,6 +58,8 @@ pub mod runtime;
 pub mod scene;
 #[cfg(feature = "bake")]
 mod sharing;
+#[cfg(feature = "bake")]
+mod solid;
 pub mod space;
 #[cfg(feature = "bake")]
 pub mod study;

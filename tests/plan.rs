@@ -195,6 +195,31 @@ fn a_scene_that_comes_no_nearer_does_no_work_for_near_levels() {
 }
 
 #[test]
+fn a_dense_forest_hides_trees_and_a_row_beside_the_eye_none() {
+    // 12 m high and 6 m apart, ten rows deep and twenty wide.
+    let dense: String = (0..200)
+        .map(|i| format!("{},0,{}\n", 6 * (i % 20) - 57, -20 - 6 * (i / 20)))
+        .collect();
+    let answer = Home::new(&dense, STANDING).plan(&[]);
+    let number = |answer: &Value, key: &str| answer[key]["mean"].as_f64().unwrap();
+    let hidden = number(&answer, "hidden_trees");
+    assert!(hidden > 20.0 && hidden < 180.0, "{hidden}");
+    let [all, unhidden] = ["triangles", "triangles_unhidden"].map(|key| number(&answer, key));
+    assert!(
+        unhidden > 0.0 && unhidden < 0.9 * all,
+        "{unhidden} of {all}"
+    );
+    let row = "-20,0,-40\n0,0,-40\n20,0,-40\n";
+    let answer = Home::new(row, STANDING).plan(&[]);
+    assert_eq!(number(&answer, "hidden_trees"), 0.0);
+    let [all, unhidden] = ["triangles", "triangles_unhidden"].map(|key| number(&answer, key));
+    assert!(
+        unhidden <= all && unhidden > 0.3 * all,
+        "{unhidden} of {all}"
+    );
+}
+
+#[test]
 fn nothing_but_the_original_is_baked_where_nothing_else_is_seen() {
     let home = tempfile::tempdir().unwrap();
     let request = Request {

@@ -16,7 +16,7 @@ use pleach::watch::Unwatched;
 fn baked(folder: &Path, sharing: f64, threads: usize) -> Baked {
     std::fs::create_dir_all(folder).unwrap();
     let options = Options {
-        leaves: Some(600),
+        leaves: Some(400),
         ..Options::default()
     };
     let input = folder.join("tree.glb");

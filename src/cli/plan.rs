@@ -200,6 +200,13 @@ fn table(answer: &Answer, spec: &Spec) -> String {
         "\nTriangles a frame over {} frames: mean {:.0}, worst {} (frame {}); without levels {:.0} and {}.\n",
         answer.frames, with.mean, with.worst, with.worst_frame, without.mean, without.worst
     );
+    if answer.hidden_trees.worst > 0 {
+        let (less, hidden) = (answer.triangles_unhidden, answer.hidden_trees);
+        out += &format!(
+            "Trees hide others: {:.1} a frame, {} at most; without these, and coarser where half hidden: mean {:.0}, worst {} triangles.\n",
+            hidden.mean, hidden.worst, less.mean, less.worst
+        );
+    }
     if answer.moved_nearer > 1.0 {
         out += &format!(
             "Levels start {:.2} times nearer than asked, for the budget of {} triangles: so much larger are their errors.\n",

@@ -1,8 +1,9 @@
 //! What one frame of the path draws.
 
+use super::hidden::Hiding;
 use super::kind::{Kind, Step};
 use super::spec::Spec;
-use crate::runtime::View;
+use crate::runtime::{Cells, View};
 
 /// What a frame shows.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -16,7 +17,14 @@ pub struct Frame {
     level_triangles: u64,
     /// The same without levels.
     pub original_triangles: u64,
+    /// Trees in view that others hide.
+    pub hidden_trees: u64,
+    /// Triangles where these are left out, and others take the level that their occlusion asks for.
+    pub unhidden_triangles: u64,
 }
+
+/// Occlusion probability from which a tree counts as hidden.
+const HIDDEN: f32 = 0.99;
 
 impl Frame {
     /// Triangles that the frame draws.
@@ -26,8 +34,14 @@ impl Frame {
 }
 
 /// Counts what `view` shows of all trees, each at the level that its distance asks for.
-pub fn frame(view: &View, kinds: &[Kind], ladders: &[Vec<Step>], spec: &Spec) -> Frame {
+pub fn frame(
+    view: &View,
+    kinds: &[Kind],
+    ladders: &[Vec<Step>],
+    (spec, grid): (&Spec, Option<&Cells>),
+) -> Frame {
     let mut out = Frame::default();
+    let mut hiding = Hiding::from(grid, view.eye);
     for (kind, ladder) in kinds.iter().zip(ladders) {
         let mut shown = vec![0u64; ladder.len()];
         let mut reach = [f64::MAX, 0.0f64];
@@ -44,9 +58,18 @@ pub fn frame(view: &View, kinds: &[Kind], ladders: &[Vec<Step>], spec: &Spec) ->
             if distance >= end_m {
                 continue;
             }
-            let level = ladder.partition_point(|step| step.distance_m <= distance) - 1;
+            let at = |distance: f64| ladder.partition_point(|s| s.distance_m <= distance) - 1;
+            let level = at(distance);
             shown[level] += 1;
             out.level_triangles += ladder[level].triangles;
+            let hidden = hiding.probability(center, kind.height_m as f32 * spot.scale);
+            if hidden >= HIDDEN {
+                out.hidden_trees += 1;
+            } else {
+                // Equation 5 with detail as one over the distance.
+                let blended = at(distance / f64::from(1.0 - hidden));
+                out.unhidden_triangles += ladder[blended].triangles;
+            }
             reach = [reach[0].min(distance), reach[1].max(distance)];
         }
         out.shown.push(shown);
@@ -85,6 +108,7 @@ mod tests {
                 spot(-400.0, 1.0),
                 spot(50.0, 1.0),
             ],
+            cells: Cells::new(Vec3::splat(-1.0), Vec3::ONE, [1; 3]),
         };
         let step = |distance_m, triangles| Step {
             distance_m,
@@ -100,11 +124,13 @@ mod tests {
             ..Spec::default()
         };
         let view = View::looking(Vec3::ZERO, Vec3::NEG_Z, 1.0, 1.0);
-        let found = frame(&view, &[kind], &[ladder], &spec);
+        let found = frame(&view, &[kind], &[ladder], (&spec, None));
         // At 10 m; at 50 m and, twice as large, at 90 m; at 90 m. The one at 400 m is past the end.
         assert_eq!(found.shown, [vec![1, 2, 1]]);
         assert_eq!(found.triangles(), 1000 + 200 + 10);
         assert_eq!(found.original_triangles, 5000);
+        // Without a grid nothing is hidden.
+        assert_eq!((found.hidden_trees, found.unhidden_triangles), (0, 1210));
         assert_eq!(found.distances, [[10.0, 90.0]]);
     }
 }

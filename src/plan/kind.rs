@@ -4,12 +4,14 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 
+use super::hidden::own_cells;
 use super::places::{self, Spot};
 use super::spec::{Spec, Species};
 use crate::botany::load::load;
 use crate::error::{Error, Result};
 use crate::ladder::{LEAST_TRIANGLES, Wanted, rungs};
 use crate::report::texture_bytes;
+use crate::runtime::Cells;
 use crate::scene::Scene;
 
 /// A kind of tree.
@@ -31,6 +33,8 @@ pub struct Kind {
     pub radius_m: f64,
     /// Where its trees stand.
     pub spots: Vec<Spot>,
+    /// How solid it is, in its normalised space.
+    pub cells: Cells,
 }
 
 /// Where a level starts, and what it costs.
@@ -75,6 +79,7 @@ impl Kind {
             height_m: f64::from(model.height()) * model.frame.radius,
             center: model.frame.center,
             radius_m: model.frame.radius,
+            cells: own_cells(&model, spots.len()),
             spots,
             input,
         })

@@ -2,10 +2,11 @@
 //!
 //! The camera goes its path through the trees; what it sees says which levels each kind of tree
 //! needs at all, how many triangles a frame takes, and how far all levels have to be moved where
-//! that is more than the budget. Trees hide nothing from each other here: the figures are what an
-//! engine without occlusion culling draws.
+//! that is more than the budget. These are what an engine without occlusion culling draws; what
+//! trees hide of each other is told beside them.
 
 mod count;
+mod hidden;
 mod kind;
 mod path;
 mod places;
@@ -49,6 +50,11 @@ pub struct Answer {
     pub budget_met: Option<bool>,
     /// Triangles a frame with levels.
     pub triangles: Cost,
+    /// Triangles a frame with levels where trees that others hide are left out, and what is half hidden
+    /// is drawn coarser.
+    pub triangles_unhidden: Cost,
+    /// Trees in the picture that others hide: with a probability of .99 neither middle nor top is seen.
+    pub hidden_trees: Cost,
     /// Triangles a frame without: every tree in view as it was modelled.
     pub triangles_original: Cost,
     /// Bytes of the textures of all levels that are needed, with mips, on the GPU.
@@ -132,10 +138,11 @@ pub fn plan(spec: &Spec, folder: &Path) -> Result<Answer> {
         .map(|(index, species)| Kind::read(spec, index, species, folder))
         .collect::<Result<_>>()?;
     let views = path::frames(spec);
+    let grid = hidden::grid(&kinds);
     let walk = |nearer: f64| -> Result<Vec<Frame>> {
         let ladders = kinds.iter().map(|k| k.ladder(spec, nearer));
         let ladders: Vec<_> = ladders.collect::<Result<_>>()?;
-        let of_frame = |view| frame(view, &kinds, &ladders, spec);
+        let of_frame = |view| frame(view, &kinds, &ladders, (spec, grid.as_ref()));
         Ok(views.par_iter().map(of_frame).collect())
     };
     let (nearer, frames) = within_budget(spec.triangles_per_frame, walk)?;
@@ -147,6 +154,8 @@ pub fn plan(spec: &Spec, folder: &Path) -> Result<Answer> {
         moved_nearer: nearer,
         budget_met: budget.map(|budget| triangles.worst <= budget),
         triangles,
+        triangles_unhidden: Cost::over(frames.iter().map(|f| f.unhidden_triangles)),
+        hidden_trees: Cost::over(frames.iter().map(|f| f.hidden_trees)),
         triangles_original: Cost::over(frames.iter().map(|f| f.original_triangles)),
         texture_bytes_estimated: true,
         ..Answer::default()

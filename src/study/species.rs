@@ -11,9 +11,10 @@ use crate::cloud::plane::{plane, planes};
 use crate::detail::optimal_distance::{aspects, own_triangles};
 use crate::error::{Error, Result};
 use crate::export::chart::Chart;
-use crate::export::project::{AlphaTest, project};
+use crate::export::project::project;
 use crate::report::Drawable;
-use crate::runtime::{Cells, Hierarchy, OwnLeaves, Subtree, by_faces, by_rays};
+use crate::runtime::{Cells, Hierarchy, OwnLeaves, Subtree};
+use crate::solid;
 use crate::space::raster::{Material, Texture};
 
 /// Samples along a texel's edge.
@@ -88,23 +89,7 @@ impl Species {
 
     /// Solidity of the tree in a grid with `longest` cells along its longest side.
     pub fn cells(&self, longest: u32, rays: Option<u32>) -> Cells {
-        let model = &self.tree.model;
-        let triangles: Vec<[Vec3; 3]> = (0..model.triangles.len() as u32)
-            .map(|t| model.corners(t))
-            .collect();
-        let points = || triangles.iter().flatten();
-        let low = points().fold(Vec3::MAX, |a, &p| a.min(p));
-        let high = points().fold(Vec3::MIN, |a, &p| a.max(p));
-        let mut cells = Cells::cubic(low, high, longest);
-        let tests: Vec<AlphaTest> = (0..triangles.len() as u32)
-            .map(|t| AlphaTest::of(model, t))
-            .collect();
-        let passes = |t: usize, v: f32, w: f32| tests[t].passes(Vec2::new(v, w));
-        match rays {
-            None => by_faces(&mut cells, &triangles, passes),
-            Some(rays) => by_rays(&mut cells, &triangles, rays, passes),
-        }
-        cells
+        solid::cells(&self.tree.model, longest, rays)
     }
 }
 
