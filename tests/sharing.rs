@@ -129,3 +129,22 @@ fn the_same_bytes_on_one_thread_and_on_two() {
     let [a, b] = [(&one, 1), (&two, 2)].map(|(f, threads)| bytes(f, &baked(f, 0.02, threads)));
     assert_eq!(a, b);
 }
+
+#[test]
+fn the_option_takes_its_number_after_an_equals_sign_and_no_file() {
+    let home = tempfile::tempdir().unwrap();
+    let message = |arguments: &[&str]| {
+        let done = std::process::Command::new(env!("CARGO_BIN_EXE_pleach"))
+            .arg("bake")
+            .args(arguments)
+            .args(["-o", "out"])
+            .current_dir(home.path())
+            .output()
+            .unwrap();
+        assert_eq!(done.status.code(), Some(2));
+        String::from_utf8(done.stderr).unwrap()
+    };
+    assert!(message(&["--sharing", "absent.glb"]).contains("absent.glb: open"));
+    assert!(message(&["--sharing=0.3", "absent.glb"]).contains("sharing is 0.3"));
+    assert!(message(&["--sharing=much", "absent.glb"]).contains("much"));
+}

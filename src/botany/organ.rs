@@ -11,8 +11,16 @@ use rayon::prelude::*;
 use super::leaf::signature;
 use super::model::{AlphaMode, Material, Model};
 use super::part::Parts;
-use super::recognise::RecogniseOptions;
 use super::tree::Organ;
+
+/// "Whatever has this in its name is that organ."
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+pub struct OrganRule {
+    /// Looked for in the names of material and object, upper or lower case.
+    pub name_contains: String,
+    /// What the triangles are.
+    pub organ: Organ,
+}
 
 /// Normals cancel to less than this share of the area on a tube (a half pipe keeps 0.64, a
 /// leaf folded by 90 degrees 0.71).
@@ -52,7 +60,7 @@ impl Shape {
 pub fn classify(
     model: &Model,
     parts: &Parts,
-    options: &RecogniseOptions,
+    rules: &[OrganRule],
     warnings: &mut Vec<String>,
 ) -> Vec<Organ> {
     let shapes: Vec<Shape> = (0..parts.triangles.len())
@@ -89,7 +97,7 @@ pub fn classify(
         *organ = votes[material].judge(&model.materials[material], *organ, copies, elsewhere);
     }
     keep_one_kind_of_wood(model, &shapes, &mut organs, &votes, material_of);
-    apply_rules(model, parts, options, &mut organs, warnings);
+    apply_rules(model, parts, rules, &mut organs, warnings);
     organs
 }
 
@@ -283,11 +291,12 @@ fn named_organ(name: &str) -> Option<Organ> {
 fn apply_rules(
     model: &Model,
     parts: &Parts,
-    options: &RecogniseOptions,
+    rules: &[OrganRule],
     organs: &mut [Organ],
     warnings: &mut Vec<String>,
 ) {
-    let needles: Vec<String> = (options.organs.iter())
+    let needles: Vec<String> = rules
+        .iter()
         .map(|r| r.name_contains.to_lowercase())
         .collect();
     let mut used = vec![false; needles.len()];
@@ -304,14 +313,14 @@ fn apply_rules(
         let triangle = parts.triangles.get(part)[0];
         let object = model.triangle_object[triangle as usize] as usize;
         if let Some(rule) = rule_of_object[object] {
-            *organ = options.organs[rule].organ;
+            *organ = rules[rule].organ;
             used[rule] = true;
         }
     }
     for (rule, _) in used.iter().enumerate().filter(|(_, used)| !**used) {
         warnings.push(format!(
             "organ rule {:?} matches no material and no object",
-            options.organs[rule].name_contains
+            rules[rule].name_contains
         ));
     }
 }

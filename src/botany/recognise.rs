@@ -1,6 +1,7 @@
 //! Polygons become botany: parts, organs, leaves, skeleton, attachment, sub-trees.
 
 use super::model::Model;
+pub use super::organ::OrganRule;
 use super::tree::{NO_NODE, Organ, Tree};
 use super::{attach, leaf, organ, part, skeleton, subtree};
 use crate::error::{Error, Result};
@@ -11,15 +12,6 @@ use crate::error::{Error, Result};
 pub struct RecogniseOptions {
     /// Rules that overrule what shape and material say; the first that matches wins.
     pub organs: Vec<OrganRule>,
-}
-
-/// "Whatever has this in its name is that organ."
-#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-pub struct OrganRule {
-    /// Looked for in the names of material and object, upper or lower case.
-    pub name_contains: String,
-    /// What the triangles are.
-    pub organ: Organ,
 }
 
 /// Finds wood, leaves, skeleton and sub-trees of a model.
@@ -40,7 +32,7 @@ pub fn recognise(model: Model, options: &RecogniseOptions) -> Result<Tree> {
     }
     let mut warnings = Vec::new();
     let mut parts = part::find(&model);
-    let organs = organ::classify(&model, &parts, options, &mut warnings);
+    let organs = organ::classify(&model, &parts, &options.organs, &mut warnings);
     let organs = mend_twigs(&mut parts, organs);
     let leaves = leaf::find(&model, &parts, &organs);
     let (skeleton, wood_node) = skeleton::build(&parts, &organs, &mut warnings);

@@ -60,7 +60,7 @@ pub struct Args {
     hierarchy: bool,
     /// Let cards that look alike share texels, on a page of half the size, a quarter and so on, while a level loses no
     /// more F1 than this; NAME_LODn_sharing.png shows which.
-    #[arg(long, value_name = "F1", num_args = 0..=1, default_missing_value = "0.01")]
+    #[arg(long, value_name = "F1", num_args = 0..=1, require_equals = true, default_missing_value = "0.01")]
     sharing: Option<f64>,
     /// Also write DIR.report.html, beside the package: figures and pictures of all levels, every budget's best cut, the
     /// skeleton, where time and bytes went. Takes about as long as the bake.

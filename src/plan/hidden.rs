@@ -3,9 +3,7 @@
 use glam::Vec3;
 
 use super::kind::Kind;
-use crate::botany::Model;
 use crate::runtime::{Cells, Law, Occlusion, Place, splat};
-use crate::solid;
 
 /// Cells over the height of the mean tree.
 const CELLS_A_TREE: f32 = 3.0;
@@ -16,15 +14,6 @@ const MOST_CELLS: f32 = 2e6;
 /// Share of the extinction that counts: leaves crowd, and what a plan must not miss asks for less than
 /// is measured (see [`Occlusion::clumped`]).
 const CLUMPING: f32 = 0.3;
-
-/// A tree's own cells along its longest side, and the number of trees up to which they are so many.
-const OWN_CELLS: [(usize, u32); 3] = [(20_000, 16), (200_000, 8), (usize::MAX, 4)];
-
-/// The cells of a tree of which so many stand in the scene.
-pub fn own_cells(model: &Model, trees: usize) -> Cells {
-    let fine = OWN_CELLS.iter().find(|(most, _)| trees <= *most);
-    solid::cells(model, fine.map_or(4, |(_, cells)| *cells), None)
-}
 
 /// The grid over all trees; `None` where there are none.
 pub fn grid(kinds: &[Kind]) -> Option<Cells> {

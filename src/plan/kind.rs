@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 
-use super::hidden::own_cells;
 use super::places::{self, Spot};
 use super::spec::{Spec, Species};
 use crate::botany::load::load;
@@ -13,6 +12,7 @@ use crate::ladder::{LEAST_TRIANGLES, Wanted, rungs};
 use crate::report::texture_bytes;
 use crate::runtime::Cells;
 use crate::scene::Scene;
+use crate::solid;
 
 /// A kind of tree.
 #[derive(Clone, Debug)]
@@ -36,6 +36,9 @@ pub struct Kind {
     /// How solid it is, in its normalised space.
     pub cells: Cells,
 }
+
+/// A tree's own cells along its longest side, and the number of trees up to which they are so many.
+const OWN_CELLS: [(usize, u32); 3] = [(20_000, 16), (200_000, 8), (usize::MAX, 4)];
 
 /// Where a level starts, and what it costs.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -79,7 +82,7 @@ impl Kind {
             height_m: f64::from(model.height()) * model.frame.radius,
             center: model.frame.center,
             radius_m: model.frame.radius,
-            cells: own_cells(&model, spots.len()),
+            cells: solid::cells(&model, own_cells(spots.len()), None),
             spots,
             input,
         })
@@ -117,4 +120,10 @@ impl Kind {
             far => far.min(vanished),
         }
     }
+}
+
+/// Cells along the longest side of a tree of which so many stand in the scene.
+fn own_cells(trees: usize) -> u32 {
+    let fine = OWN_CELLS.iter().find(|(most, _)| trees <= *most);
+    fine.map_or(1, |(_, cells)| *cells)
 }

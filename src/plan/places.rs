@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
-use glam::Vec3;
+use glam::{DMat4, Vec3};
 
+use crate::botany::load::{self, Limits};
 use crate::error::{Error, Result};
 
 /// A tree's foot and its scale.
@@ -15,13 +16,48 @@ pub struct Spot {
     pub scale: f32,
 }
 
-/// Reads a file of places.
+/// Reads a file of places: text, or a .glb or .gltf whose mesh nodes and instances are trees.
 ///
 /// # Errors
-/// [`Error::Io`]; [`Error::Input`] with the line.
+/// [`Error::Io`]; [`Error::Input`] with the line; those of loading.
 pub fn read(file: &Path) -> Result<Vec<Spot>> {
+    let ending = file.extension().unwrap_or_default().to_ascii_lowercase();
+    if ending == "glb" || ending == "gltf" {
+        return of_meshes(load::places(file, &Limits::default())?, file);
+    }
     let text = std::fs::read_to_string(file).map_err(|e| Error::io(file, "read", e))?;
     parse(&text, file)
+}
+
+/// A tree for each place; wood and leaves that are meshes of their own at one place are one tree.
+fn of_meshes(transforms: Vec<DMat4>, file: &Path) -> Result<Vec<Spot>> {
+    let mut out: Vec<Spot> = Vec::with_capacity(transforms.len());
+    let mut known = std::collections::BTreeSet::new();
+    for (index, transform) in transforms.into_iter().enumerate() {
+        let foot = transform.w_axis.truncate().as_vec3();
+        // Scales that differ from axis to axis count as the uniform one of the same volume.
+        let scale = transform.determinant().abs().cbrt() as f32;
+        if !(foot.is_finite() && scale > 0.0 && scale.is_finite()) {
+            return Err(Error::input(
+                file,
+                format!("mesh node {index}"),
+                format!("a tree can't stand at {foot} with the scale {scale}"),
+                "give the node a transform that can be undone",
+            ));
+        }
+        if known.insert([foot.x, foot.y, foot.z, scale].map(f32::to_bits)) {
+            out.push(Spot { foot, scale });
+        }
+    }
+    match out.is_empty() {
+        true => Err(Error::input(
+            file,
+            "the file",
+            "no node of its scene has a mesh",
+            "place a mesh, of whatever shape, for each tree",
+        )),
+        false => Ok(out),
+    }
 }
 
 fn parse(text: &str, file: &Path) -> Result<Vec<Spot>> {
@@ -117,5 +153,43 @@ mod tests {
         }
         assert!(cells.iter().all(|&n| (90..=110).contains(&n)), "{cells:?}");
         assert_ne!(strewn(1, 100.0, 0), strewn(1, 100.0, 1));
+    }
+
+    #[test]
+    fn nodes_with_a_mesh_are_trees_once_for_each_place() {
+        let home = tempfile::tempdir().unwrap();
+        let file = home.path().join("forest.gltf");
+        let write = |nodes: &str, roots: &str| {
+            let text = format!(
+                r#"{{"asset": {{"version": "2.0"}}, "scene": 0, "scenes": [{{"nodes": [{roots}]}}],
+                "nodes": [{nodes}], "meshes": [{{"primitives": [{{"attributes": {{"POSITION": 0}}}}]}}]}}"#
+            );
+            std::fs::write(&file, text).unwrap();
+        };
+        // Leaves and wood of one tree, another below a moved and scaled parent, an empty node.
+        write(
+            r#"{"mesh": 0, "translation": [1, 2, 3], "scale": [2, 2, 2]},
+            {"mesh": 0, "translation": [1, 2, 3], "scale": [2, 2, 2]},
+            {"children": [3], "translation": [10, 0, 0], "scale": [3, 3, 3]},
+            {"mesh": 0, "translation": [0, 0, -1]}, {}"#,
+            "0, 1, 2, 4",
+        );
+        let found = read(&file).unwrap();
+        let told: Vec<([f32; 3], f32)> = found
+            .iter()
+            .map(|s| (s.foot.to_array(), (s.scale * 1e4).round() / 1e4))
+            .collect();
+        assert_eq!(told, [([1.0, 2.0, 3.0], 2.0), ([10.0, 0.0, -3.0], 3.0)]);
+        write("{}", "0");
+        let error = read(&file).unwrap_err();
+        assert_eq!(error.exit_code(), 2);
+        assert!(
+            error
+                .to_string()
+                .contains("no node of its scene has a mesh"),
+            "{error}"
+        );
+        write(r#"{"mesh": 0, "scale": [0, 1, 1]}"#, "0");
+        assert!(read(&file).unwrap_err().to_string().contains("mesh node 0"));
     }
 }

@@ -43,7 +43,8 @@ pub struct Species {
     /// Trees that are strewn over the region, where no places are given.
     pub count: u32,
     /// A file of places: a line a tree, "x, y, z" or "x, y, z, scale", metres; a head line and lines
-    /// that begin with # are passed over.
+    /// that begin with # are passed over. Or a .glb or .gltf: each node with a mesh, and each instance of
+    /// EXT_mesh_gpu_instancing, is a tree; what the mesh is does not matter.
     pub places: Option<PathBuf>,
 }
 

@@ -32,6 +32,8 @@ mod warning;
 
 use std::path::Path;
 
+use glam::DMat4;
+
 use super::model::Model;
 use crate::{Error, Result};
 use buffer::Asset;
@@ -140,6 +142,21 @@ pub fn load_slice(bytes: &[u8], path: &Path, limits: &Limits) -> Result<Model> {
         .unwrap_or_default();
     model.warnings = warnings.into_lines();
     Ok(model)
+}
+
+/// Where a .glb or .gltf places its meshes: the transform of each node with a mesh, and of each of its
+/// instances (EXT_mesh_gpu_instancing). The meshes themselves are not read.
+///
+/// # Errors
+/// As [`load`].
+pub fn places(path: &Path, limits: &Limits) -> Result<Vec<DMat4>> {
+    let bytes = read(path, limits)?;
+    let (document, chunk) = container::open(&bytes, path, limits)?;
+    let mut warnings = Warnings::default();
+    container::check_extensions(&document, path, &mut warnings)?;
+    let asset = Asset::open(path, &document, bytes.len() as u64, chunk, limits)?;
+    let all = scene::placements(&asset, &mut warnings)?;
+    Ok(all.into_iter().map(|p| p.world_from_mesh).collect())
 }
 
 /// Shorthand for an input error of one file.

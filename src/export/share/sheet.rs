@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::Vec2;
 
-use super::owners;
+use super::owner::owners;
 use crate::botany::model::Image;
 use crate::export::chart::{Chart, Shape};
 use crate::space::hull;

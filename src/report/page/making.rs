@@ -2,7 +2,7 @@
 
 use maud::{Markup, PreEscaped, html};
 
-use super::data_uri;
+use super::embed::data_uri;
 use super::plot::{Plot, Series, mark};
 use super::tables::{bytes, count, table};
 use crate::detail::optimal_cut::Candidate;

@@ -3,16 +3,16 @@
 //! The page states what the files on disk look like: it draws them anew. It holds style, script
 //! and pictures itself and asks for nothing else.
 
+mod embed;
 mod making;
 mod picture;
 mod plot;
 mod tables;
 
-use base64::Engine;
-use base64::engine::general_purpose::STANDARD;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use rayon::prelude::*;
 
+use self::embed::data_uri;
 pub use self::making::{Made, Making, Recognised};
 use self::picture::{AGREEMENT, Pair, flip_color, page as atlas_page, pair};
 use self::plot::{Plot, Series, mark};
@@ -327,10 +327,6 @@ fn image_of(png: &[u8], pair: &Pair, alt: &str, class: &str) -> Markup {
         img class=[(!class.is_empty()).then_some(class)] src=(data_uri(png))
             width=(pair.width) height=(pair.height) alt=(alt);
     }
-}
-
-fn data_uri(png: &[u8]) -> String {
-    format!("data:image/png;base64,{}", STANDARD.encode(png))
 }
 
 /// The images of a level's file.
