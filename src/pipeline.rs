@@ -48,7 +48,7 @@ pub struct Baked {
 }
 
 /// Azimuth of the first view of the report, degrees: not one of those that levels were fitted to.
-const REPORT_OFFSET_DEG: f32 = 11.0;
+pub const REPORT_OFFSET_DEG: f32 = 11.0;
 
 /// Bakes a tree into a package: complete, or nothing.
 ///

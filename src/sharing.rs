@@ -57,8 +57,8 @@ impl<'a> Ruler<'a> {
         let mut model = load_slice(&bytes, Path::new("level.glb"), &Limits::default())?;
         let texture_bytes = texture_bytes(&model);
         model.keep_only_base_colors();
-        let known = self.references.iter();
-        let reference = known.min_by_key(|r| r.height_px().abs_diff(height_px));
+        let mut known = self.references.iter();
+        let reference = known.find(|r| r.height_px() == height_px);
         let figures = reference.map(|r| r.compare(&model, Sampling::REFERENCE));
         Ok((figures.unwrap_or_default().f1, texture_bytes))
     }
@@ -146,12 +146,12 @@ pub fn kept(sharing: &Sharing, most: f64) -> Option<String> {
     let kept: Vec<String> = sharing
         .levels
         .iter()
-        .filter(|l| l.texture_bytes_with == l.texture_bytes_without)
+        .filter(|l| l.tiles > 0 && l.texture_bytes_with == l.texture_bytes_without)
         .map(|l| l.level.to_string())
         .collect();
     (!kept.is_empty()).then(|| {
         format!(
-            "level {} keeps its page: on one of half the size it would lose more than {most} of F1",
+            "level {} keeps its page: none of half the size was found on which it loses at most {most} of F1",
             kept.join(", ")
         )
     })

@@ -80,4 +80,9 @@ fn a_bake_that_fails_leaves_no_page() {
     let done = bake(home.path(), "out", &["--page"]);
     assert_eq!(done.status.code(), Some(2));
     assert_eq!(files(home.path()).len(), 2);
+    // A batch has no page, and says so before it bakes.
+    let done = bake(home.path(), "out", &["--page", "--batch"]);
+    assert_eq!(done.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&done.stderr).contains("--page shows one tree"));
+    assert_eq!(files(home.path()).len(), 2);
 }

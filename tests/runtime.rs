@@ -249,6 +249,22 @@ fn trees_outside_the_picture_wait_until_another_picture_asks_for_them() {
         anew.collect(&shadow, &mut b);
         assert!(a == b, "{} and {} drawn", a.len(), b.len());
         assert!(!a.is_empty());
+        // The eye's own picture after the shadow's: neither is the other's.
+        for (forest, out) in [(&mut lazy, &mut a), (&mut anew, &mut b)] {
+            out.clear();
+            forest.collect(&view, out);
+        }
+        let mut own = new();
+        own.update(&view);
+        let mut c = Vec::new();
+        own.collect(&view, &mut c);
+        assert!(
+            a == c && b == c,
+            "{} {} {} drawn",
+            a.len(),
+            b.len(),
+            c.len()
+        );
         // The head turns where the eye is: what comes into the picture is cut then.
         let turned = View::looking(view.eye, -view.forward, 1.0, 1.7);
         for forest in [&mut lazy, &mut again] {

@@ -9,7 +9,7 @@ use super::page;
 use super::progress::{Bars, catch_ctrl_c};
 use super::scene::scene;
 use crate::batch::Batch;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::knobs::read;
 use crate::pipeline::{Baked, Limit, Request, Wanted, bake, to_json};
 use crate::recipe::{Preset, Recipe};
@@ -89,6 +89,12 @@ pub fn run(args: Args) -> Result<()> {
     let request = request(&args)?;
     catch_ctrl_c()?;
     if args.batch || args.inputs.len() > 1 {
+        if args.page {
+            return Err(Error::usage(
+                "--page shows one tree, and this is a batch",
+                "bake the tree alone, or run pleach evaluate on its package",
+            ));
+        }
         let batch = Batch {
             inputs: args.inputs,
             output: args.output,

@@ -3,10 +3,10 @@
 use std::path::PathBuf;
 
 use crate::botany::Model;
-use crate::botany::load::load;
+use crate::botany::load::{load, load_with};
 use crate::error::{Error, Result};
 use crate::export::package::beside;
-use crate::pipeline::{Baked, Request};
+use crate::pipeline::{Baked, REPORT_OFFSET_DEG, Request};
 use crate::report::schema::{Bake, Report};
 use crate::report::{Content, Made, Settings, evaluate};
 
@@ -21,7 +21,7 @@ const HEIGHTS_PX: [u32; 2] = [256, 64];
 /// # Errors
 /// Those of loading the files, and [`Error::Io`].
 pub fn write(request: &Request, baked: &Baked, took: &Bake) -> Result<PathBuf> {
-    let original = load(&request.input)?;
+    let original = load_with(&request.input, &request.recipe.limits)?;
     let rows = &baked.report.levels;
     let levels: Vec<Model> = rows
         .iter()
@@ -33,7 +33,7 @@ pub fn write(request: &Request, baked: &Baked, took: &Bake) -> Result<PathBuf> {
             .iter()
             .map(|row| row.sizes.first().map(|s| s.height_px))
             .collect(),
-        azimuth_offset_deg: 11.0,
+        azimuth_offset_deg: REPORT_OFFSET_DEG,
         client: true,
         appearance: true,
         ..Settings::default()
@@ -72,8 +72,11 @@ pub fn write(request: &Request, baked: &Baked, took: &Bake) -> Result<PathBuf> {
     let html = page.html()?;
     let file = beside(&request.output, PAGE);
     let draft = beside(&request.output, ".report.html.draft");
-    let fail = |e| Error::io(&file, "write", e);
-    std::fs::write(&draft, html).map_err(fail)?;
-    std::fs::rename(&draft, &file).map_err(fail)?;
+    let written = std::fs::write(&draft, html).and_then(|()| std::fs::rename(&draft, &file));
+    written.map_err(|e| {
+        // Nothing half-written stays; the error that led here is the one to tell.
+        let _ = std::fs::remove_file(&draft);
+        Error::io(&file, "write", e)
+    })?;
     Ok(file)
 }

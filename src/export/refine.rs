@@ -14,7 +14,7 @@
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
-use super::chart::Chart;
+use super::chart::{Chart, Shape};
 use super::foliage::Foliage;
 use super::texel::Stored;
 
@@ -49,6 +49,9 @@ pub fn refine(foliage: &Foliage, targets: &[Target], options: Refine) -> Vec<f32
     let mut score: Vec<f32> = foliage.texels.iter().map(Stored::coverage).collect();
     let mut mean = vec![0.0f32; score.len()];
     let rows: Vec<Vec<u32>> = foliage.charts.iter().map(Chart::row_lengths).collect();
+    // Windows show texels of others, and the rows of outlines' boxes hold some.
+    let several = |c: &Chart| matches!(c.shape, Shape::Window | Shape::Mask(_));
+    let overlap = foliage.charts.iter().any(several);
     for round in 0..options.rounds {
         let on: Vec<bool> = score.iter().map(|&s| s >= 0.5).collect();
         // Views take turns, a third of them a round where there are rounds for all: a third of the
@@ -81,11 +84,17 @@ pub fn refine(foliage: &Foliage, targets: &[Target], options: Refine) -> Vec<f32
             .collect();
         // Later rounds move less, so that two cards do not swap a cell for ever.
         let step = 1.0 / (round as f32 + 1.0).sqrt();
-        for (at, (sum, hits)) in of_page(foliage, &rows, votes).into_iter().enumerate() {
-            if foliage.owned[at] {
-                mean[at] += step * (sum / hits.max(1) as f32 - mean[at]);
-                score[at] = foliage.texels[at].coverage() + options.weight * mean[at];
-            }
+        let mut settle = |at: usize, (sum, hits): Votes| {
+            mean[at] += step * (sum / hits.max(1) as f32 - mean[at]);
+            score[at] = foliage.texels[at].coverage() + options.weight * mean[at];
+        };
+        if overlap {
+            let sums = of_page(foliage, &rows, &votes);
+            let owned = (0..sums.len()).filter(|&at| foliage.owned[at]);
+            owned.for_each(|at| settle(at, sums[at]));
+        } else {
+            // Every texel has its votes from one card: no second page of them.
+            each_vote(foliage, &rows, &votes, settle);
         }
     }
     follow_neighbours(&mut score, foliage);
@@ -96,20 +105,31 @@ pub fn refine(foliage: &Foliage, targets: &[Target], options: Refine) -> Vec<f32
 type Votes = (f32, u32);
 
 /// The votes of all cards that show a texel.
-fn of_page(foliage: &Foliage, rows: &[Vec<u32>], votes: Vec<Vec<Votes>>) -> Vec<Votes> {
+fn of_page(foliage: &Foliage, rows: &[Vec<u32>], votes: &[Vec<Votes>]) -> Vec<Votes> {
     let mut sums: Vec<Votes> = vec![(0.0, 0); foliage.texels.len()];
+    each_vote(foliage, rows, votes, |at, (sum, hits)| {
+        sums[at].0 += sum;
+        sums[at].1 += hits;
+    });
+    sums
+}
+
+/// Visits what each card votes on each of the page's texels that it shows.
+fn each_vote(
+    foliage: &Foliage,
+    rows: &[Vec<u32>],
+    votes: &[Vec<Votes>],
+    mut visit: impl FnMut(usize, Votes),
+) {
     for ((chart, rows), votes) in foliage.charts.iter().zip(rows).zip(votes) {
         for (y, &length) in (0..).zip(rows) {
             for x in 0..length {
                 let [ax, ay] = chart.in_atlas(x, y);
-                let all = &mut sums[(ay * foliage.size[0] + ax) as usize];
-                let (sum, hits) = votes[(y * chart.size[0] + x) as usize];
-                all.0 += sum;
-                all.1 += hits;
+                let at = (ay * foliage.size[0] + ax) as usize;
+                visit(at, votes[(y * chart.size[0] + x) as usize]);
             }
         }
     }
-    sums
 }
 
 /// Share of its neighbours' mean that a texel takes over.

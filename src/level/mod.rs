@@ -268,24 +268,15 @@ impl Baker<'_> {
     pub fn triangles_within(&self, pixels: f64, height_px: f64) -> u64 {
         let length = pixels / height_px * f64::from(self.original.height);
         let choices = self.choices();
-        let pruning = Pruning {
-            hierarchy: self.hierarchy,
-            card_error: &self.hierarchy.error,
-            card_triangles: if self.recipe.triangular_cards { 1 } else { 2 },
-            choices: &choices,
-        };
-        pruning.cut_within(self.area() * length * length).triangles
+        self.pruning(&choices)
+            .cut_within(self.area() * length * length)
+            .triangles
     }
 
     /// Every budget's best cut, from one triangle up, for trees whose normalised unit is so many metres.
     pub fn candidates(&self, unit_m: f64) -> Vec<Candidate> {
         let choices = self.choices();
-        let pruning = Pruning {
-            hierarchy: self.hierarchy,
-            card_error: &self.hierarchy.error,
-            card_triangles: if self.recipe.triangular_cards { 1 } else { 2 },
-            choices: &choices,
-        };
+        let pruning = self.pruning(&choices);
         // Multipliers by factors of two: two cuts of which one costs a few percent more look alike.
         let mut out: Vec<Candidate> = Vec::new();
         for exponent in -120..40 {
@@ -301,6 +292,15 @@ impl Baker<'_> {
             }
         }
         out
+    }
+
+    fn pruning<'c>(&'c self, choices: &'c [Vec<Choice>]) -> Pruning<'c> {
+        Pruning {
+            hierarchy: self.hierarchy,
+            card_error: &self.hierarchy.error,
+            card_triangles: if self.recipe.triangular_cards { 1 } else { 2 },
+            choices,
+        }
     }
 
     fn choices(&self) -> Vec<Vec<Choice>> {

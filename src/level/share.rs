@@ -8,9 +8,9 @@ use crate::export::refine::{f1, refine};
 use crate::export::share::{self, Cards, Plan};
 use crate::watch::{Watch, part};
 
-/// The fit's own measure sees single texels, and loses three to ten times as much as pictures where the level
-/// starts do: what it lets pass is measured there.
-const STRICTER: f64 = 6.0;
+/// So many times the allowed loss may show in the fit's own measure, which sees single texels: it loses more than
+/// pictures where the level starts, and what passes here is measured there.
+const PASSES: f64 = 6.0;
 
 impl Baker<'_> {
     /// A level with all that shares its texels.
@@ -34,7 +34,7 @@ impl Baker<'_> {
         let pool = self.pool(fitted.request);
         let targets = self.original.targets(pool, Some(&wood_scene(&taken)));
         let goal = self.goal(fitted.request);
-        let least = f1(&fitted.foliage, &targets) - STRICTER * self.recipe.sharing;
+        let least = f1(&fitted.foliage, &targets) - PASSES * self.recipe.sharing;
         let cards = Cards {
             model: &self.tree.model,
             groups: &fitted.plan.cards,

@@ -3,7 +3,7 @@
 use super::hidden::Hiding;
 use super::kind::{Kind, Step};
 use super::spec::Spec;
-use crate::runtime::{Cells, View};
+use crate::runtime::View;
 
 /// What a frame shows.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -38,17 +38,18 @@ pub fn frame(
     view: &View,
     kinds: &[Kind],
     ladders: &[Vec<Step>],
-    (spec, grid): (&Spec, Option<&Cells>),
+    spec: &Spec,
+    hiding: &mut Hiding,
 ) -> Frame {
     let mut out = Frame::default();
-    let mut hiding = Hiding::from(grid, view.eye);
+    hiding.look_from(view.eye);
     for (kind, ladder) in kinds.iter().zip(ladders) {
         let mut shown = vec![0u64; ladder.len()];
         let mut reach = [f64::MAX, 0.0f64];
         let end_m = kind.end_m(&spec.scene);
         for spot in &kind.spots {
-            let center = spot.foot + kind.center.as_vec3() * spot.scale;
-            if !view.meets(center, kind.radius_m as f32 * spot.scale) {
+            let (center, radius) = kind.sphere(spot);
+            if !view.meets(center, radius) {
                 continue;
             }
             out.original_triangles += kind.triangles;
@@ -84,6 +85,7 @@ mod tests {
 
     use super::super::places::Spot;
     use super::*;
+    use crate::runtime::Cells;
     use crate::scene::Scene;
 
     #[test]
@@ -124,7 +126,7 @@ mod tests {
             ..Spec::default()
         };
         let view = View::looking(Vec3::ZERO, Vec3::NEG_Z, 1.0, 1.0);
-        let found = frame(&view, &[kind], &[ladder], (&spec, None));
+        let found = frame(&view, &[kind], &[ladder], &spec, &mut Hiding::new(None));
         // At 10 m; at 50 m and, twice as large, at 90 m; at 90 m. The one at 400 m is past the end.
         assert_eq!(found.shown, [vec![1, 2, 1]]);
         assert_eq!(found.triangles(), 1000 + 200 + 10);

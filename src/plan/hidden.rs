@@ -25,9 +25,8 @@ pub fn grid(kinds: &[Kind]) -> Option<Cells> {
     let count = all().count();
     let (mut low, mut high, mut height) = (Vec3::MAX, Vec3::MIN, 0.0f64);
     for (kind, spot) in all() {
-        let reach = kind.radius_m as f32 * spot.scale;
-        let center = spot.foot + kind.center.as_vec3() * spot.scale;
-        (low, high) = (low.min(center - reach), high.max(center + reach));
+        let (center, radius) = kind.sphere(spot);
+        (low, high) = (low.min(center - radius), high.max(center + radius));
         height += kind.height_m * f64::from(spot.scale);
     }
     if count == 0 || !(high - low).is_finite() {
@@ -44,26 +43,30 @@ pub fn grid(kinds: &[Kind]) -> Option<Cells> {
     let mut grid = Cells::new(low, low + sides * edge, sides.to_array().map(|c| c as u32));
     let mut extinction = vec![0.0; grid.solidity().len()];
     for (kind, spot) in all() {
+        let (center, scale) = kind.sphere(spot);
         let place = Place {
-            scale: kind.radius_m as f32 * spot.scale,
-            ..Place::at(spot.foot + kind.center.as_vec3() * spot.scale)
+            scale,
+            ..Place::at(center)
         };
         splat(&mut grid, &mut extinction, &kind.cells, &place);
     }
     Some(grid)
 }
 
-/// How hidden trees are from one eye.
+/// How hidden trees are from the eye that was last looked from.
 pub struct Hiding<'g>(Option<Occlusion<'g>>);
 
 impl<'g> Hiding<'g> {
-    /// From an eye; without a grid nothing is hidden.
-    pub fn from(grid: Option<&'g Cells>, eye: Vec3) -> Self {
-        Self(grid.map(|cells| {
-            let mut occlusion = Occlusion::new(cells, Law::Beer).clumped(CLUMPING);
+    /// Without a grid nothing is hidden.
+    pub fn new(grid: Option<&'g Cells>) -> Self {
+        Self(grid.map(|cells| Occlusion::new(cells, Law::Beer).clumped(CLUMPING)))
+    }
+
+    /// Moves the eye.
+    pub fn look_from(&mut self, eye: Vec3) {
+        if let Some(occlusion) = &mut self.0 {
             occlusion.look_from(eye);
-            occlusion
-        }))
+        }
     }
 
     /// Probability that what is most visible of a tree is hidden: the least over its middle and its top.
@@ -111,7 +114,8 @@ mod tests {
     fn the_farther_down_a_row_the_more_is_hidden_and_nothing_hides_the_first() {
         let kinds = [row(12, 0.8)];
         let grid = grid(&kinds).unwrap();
-        let mut hiding = Hiding::from(Some(&grid), Vec3::Y * 1.7);
+        let mut hiding = Hiding::new(Some(&grid));
+        hiding.look_from(Vec3::Y * 1.7);
         let hidden: Vec<f32> = (0..12)
             .map(|i| hiding.probability(Vec3::new(0.0, 3.0, -10.0 - 5.0 * i as f32), 6.0))
             .collect();
@@ -119,20 +123,19 @@ mod tests {
         assert!(hidden.windows(2).all(|w| w[0] <= w[1] + 1e-6), "{hidden:?}");
         assert!(hidden[11] > 0.9, "{hidden:?}");
         // From the side each is in the first row.
-        let mut aside = Hiding::from(Some(&grid), Vec3::new(60.0, 1.7, -40.0));
+        let mut aside = Hiding::new(Some(&grid));
+        aside.look_from(Vec3::new(60.0, 1.7, -40.0));
         assert!(aside.probability(Vec3::new(0.0, 3.0, -40.0), 6.0) < 0.5);
     }
 
     #[test]
     fn without_trees_or_without_leaves_nothing_is_hidden() {
         assert!(grid(&[]).is_none());
-        assert_eq!(
-            Hiding::from(None, Vec3::ZERO).probability(Vec3::ONE, 1.0),
-            0.0
-        );
+        assert_eq!(Hiding::new(None).probability(Vec3::ONE, 1.0), 0.0);
         let kinds = [row(5, 0.0)];
         let grid = grid(&kinds).unwrap();
-        let mut hiding = Hiding::from(Some(&grid), Vec3::Y);
+        let mut hiding = Hiding::new(Some(&grid));
+        hiding.look_from(Vec3::Y);
         assert_eq!(hiding.probability(Vec3::new(0.0, 3.0, -30.0), 6.0), 0.0);
     }
 }

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
 use super::places::{self, Spot};
 use super::spec::{Spec, Species};
@@ -36,9 +36,6 @@ pub struct Kind {
     /// How solid it is, in its normalised space.
     pub cells: Cells,
 }
-
-/// A tree's own cells along its longest side, and the number of trees up to which they are so many.
-const OWN_CELLS: [(usize, u32); 3] = [(20_000, 16), (200_000, 8), (usize::MAX, 4)];
 
 /// Where a level starts, and what it costs.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -88,6 +85,12 @@ impl Kind {
         })
     }
 
+    /// Bounding sphere of one that stands there, metres.
+    pub fn sphere(&self, spot: &Spot) -> (Vec3, f32) {
+        let center = spot.foot + self.center.as_vec3() * spot.scale;
+        (center, self.radius_m as f32 * spot.scale)
+    }
+
     /// Its levels, the original first, with all but that moved `nearer` times.
     ///
     /// # Errors
@@ -124,6 +127,9 @@ impl Kind {
 
 /// Cells along the longest side of a tree of which so many stand in the scene.
 fn own_cells(trees: usize) -> u32 {
-    let fine = OWN_CELLS.iter().find(|(most, _)| trees <= *most);
-    fine.map_or(1, |(_, cells)| *cells)
+    match trees {
+        0..=20_000 => 16,
+        20_001..=200_000 => 8,
+        _ => 4,
+    }
 }

@@ -18,8 +18,10 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::error::{Error, Result};
+use crate::runtime::Cells;
 use crate::scene::Scene;
 use count::{Frame, frame};
+use hidden::Hiding;
 pub use kind::Kind;
 pub use spec::{Key, Spec, Species};
 
@@ -138,14 +140,17 @@ pub fn plan(spec: &Spec, folder: &Path) -> Result<Answer> {
         .map(|(index, species)| Kind::read(spec, index, species, folder))
         .collect::<Result<_>>()?;
     let views = path::frames(spec);
-    let grid = hidden::grid(&kinds);
-    let walk = |nearer: f64| -> Result<Vec<Frame>> {
+    let walk = |nearer: f64, grid: Option<&Cells>| -> Result<Vec<Frame>> {
         let ladders = kinds.iter().map(|k| k.ladder(spec, nearer));
         let ladders: Vec<_> = ladders.collect::<Result<_>>()?;
-        let of_frame = |view| frame(view, &kinds, &ladders, (spec, grid.as_ref()));
-        Ok(views.par_iter().map(of_frame).collect())
+        let frames = views.par_iter().map_init(
+            || Hiding::new(grid),
+            |hiding, view| frame(view, &kinds, &ladders, spec, hiding),
+        );
+        Ok(frames.collect())
     };
-    let (nearer, frames) = within_budget(spec.triangles_per_frame, walk)?;
+    let nearer = within_budget(spec.triangles_per_frame, |nearer| walk(nearer, None))?;
+    let frames = walk(nearer, hidden::grid(&kinds).as_ref())?;
     let triangles = Cost::over(frames.iter().map(Frame::triangles));
     let budget = Some(spec.triangles_per_frame).filter(|&n| n > 0);
     let mut answer = Answer {
@@ -185,31 +190,28 @@ fn names_differ(spec: &Spec) -> Result<()> {
     Ok(())
 }
 
-/// The least move at which the worst frame keeps the budget, and what the frames show then.
-fn within_budget(
-    budget: u64,
-    walk: impl Fn(f64) -> Result<Vec<Frame>>,
-) -> Result<(f64, Vec<Frame>)> {
-    let worst = |frames: &[Frame]| frames.iter().map(Frame::triangles).max().unwrap_or(0);
-    let as_asked = walk(1.0)?;
-    if budget == 0 || worst(&as_asked) <= budget {
-        return Ok((1.0, as_asked));
+/// The least move at which the worst frame keeps the budget; [`NEAREST`] where none does.
+fn within_budget(budget: u64, walk: impl Fn(f64) -> Result<Vec<Frame>>) -> Result<f64> {
+    let kept = |nearer: f64| -> Result<bool> {
+        let frames = walk(nearer)?;
+        Ok(frames.iter().all(|f| f.triangles() <= budget))
+    };
+    if budget == 0 || kept(1.0)? {
+        return Ok(1.0);
     }
     let (mut low, mut high) = (1.0, NEAREST);
-    let mut kept = walk(high)?;
-    if worst(&kept) > budget {
-        return Ok((high, kept));
+    if !kept(high)? {
+        return Ok(high);
     }
     // Factors, so halved in the logarithm: to a hundredth.
     while high / low > 1.01 {
         let middle = f64::sqrt(low * high);
-        let frames = walk(middle)?;
-        match worst(&frames) <= budget {
-            true => (high, kept) = (middle, frames),
+        match kept(middle)? {
+            true => high = middle,
             false => low = middle,
         }
     }
-    Ok((high, kept))
+    Ok(high)
 }
 
 fn species(

@@ -24,6 +24,8 @@ pub struct Forest<V> {
     spheres: Spheres,
     /// For each tree 0 where it may be in the picture, infinity where not.
     veil: Vec<f32>,
+    /// The picture that it is for.
+    veiled: Option<View>,
     /// For each tree whether its cut rests on what is hidden.
     asked: Vec<bool>,
     /// For each tree the path at which its first node is due; [`ANEW`] where all of its nodes are.
@@ -61,6 +63,7 @@ impl<V: Visibility> Forest<V> {
         Self {
             spheres: Spheres::new(places.iter().map(sphere)),
             veil: vec![f32::INFINITY; places.len()],
+            veiled: None,
             asked: vec![false; places.len()],
             due: vec![ANEW; places.len()],
             fades: vec![0.0; places.len()],
@@ -92,7 +95,7 @@ impl<V: Visibility> Forest<V> {
         if !view.sees() {
             return changes;
         }
-        Pyramid::new(view).veils(&self.spheres, &mut self.veil);
+        self.look(view);
         let path = self.clock.path;
         // Most trees are due in no frame: they are passed over in groups.
         const TOGETHER: usize = 32;
@@ -178,14 +181,19 @@ impl<V: Visibility> Forest<V> {
         }
     }
 
+    /// Finds what may be in a picture.
+    fn look(&mut self, view: &View) {
+        Pyramid::new(view).veils(&self.spheres, &mut self.veil);
+        self.veiled = Some(*view);
+    }
+
     /// Cuts what may be in this picture and was not in that of the last update.
     fn prepare(&mut self, view: &View) {
-        let updated = self.clock.view();
-        if updated == Some(*view) {
+        if self.veiled == Some(*view) {
             return;
         }
-        Pyramid::new(view).veils(&self.spheres, &mut self.veil);
-        let (Some(updated), path) = (updated, self.clock.path) else {
+        self.look(view);
+        let (Some(updated), path) = (self.clock.view(), self.clock.path) else {
             return;
         };
         for tree in 0..self.due.len() {

@@ -114,15 +114,13 @@ impl Plan {
 
 /// Charts of as many of the largest cards as have room on the page.
 fn keep(cards: Cards, order: &[u32], density: f32, size: [u32; 2]) -> Vec<Chart> {
+    let chart = |&i: &u32| {
+        let card = &cards.groups[i as usize].card;
+        upright(Chart::new(card, density, cards.pad))
+    };
+    let all: Vec<Chart> = order.par_iter().map(chart).collect();
     let fit = |count: usize| {
-        let chart = |&i: &u32| {
-            upright(Chart::new(
-                &cards.groups[i as usize].card,
-                density,
-                cards.pad,
-            ))
-        };
-        let mut charts: Vec<Chart> = order[..count].iter().map(chart).collect();
+        let mut charts = all[..count].to_vec();
         place(&mut charts, size).then_some(charts)
     };
     let (mut best, mut too_many) = (Vec::new(), order.len() + 1);

@@ -29,14 +29,14 @@ pub fn owners(charts: &[Chart], size: [u32; 2]) -> Vec<Option<u32>> {
             .collect();
         seen.sort_unstable();
         let most = seen.chunk_by(|a, b| a == b).max_by_key(|run| run.len());
-        // Narrower than a texel, or beside all tiles.
-        let nearest = || {
+        // Narrower than a texel, or beside all tiles: no tile has most, any will do.
+        let any = || {
             (0..)
                 .zip(charts)
                 .find(|(_, c)| c.shape != Shape::Window)
                 .map(|(i, _)| i)
         };
-        most.map(|run| run[0]).or_else(nearest)
+        most.map(|run| run[0]).or_else(any)
     };
     let copy = |chart: &Chart| {
         (chart.shape == Shape::Window)
