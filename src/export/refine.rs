@@ -279,3 +279,28 @@ fn scan(chart: &Chart, rows: &[u32], target: &Target, mut visit: impl FnMut(usiz
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn f1_is_twice_the_common_cells_over_both_areas() {
+        let target = |wanted: [bool; 4], taken: [bool; 4]| Target {
+            right: Vec3::X,
+            down: Vec3::NEG_Y,
+            base: Vec2::ZERO,
+            size: [4, 1],
+            wanted: wanted.to_vec(),
+            taken: taken.to_vec(),
+        };
+        let (yes, no) = (true, false);
+        // Three wanted, two covered, one of them wanted: 2 * 1 / (3 + 2).
+        let some = target([yes, yes, yes, no], [no, no, yes, yes]);
+        // All right.
+        let all = target([yes, no, no, no], [yes, no, no, no]);
+        let nothing = Foliage::default();
+        assert!((f1(&nothing, std::slice::from_ref(&some)) - 0.4).abs() < 1e-12);
+        assert!((f1(&nothing, &[some, all]) - 0.7).abs() < 1e-12);
+    }
+}

@@ -87,3 +87,77 @@ fn draw(chart: &Chart, page: &Image, mut put: impl FnMut(u32, u32, [u8; 4])) {
         put(x, y, if a >= 128 { [r, g, b, 255] } else { ground });
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use super::*;
+
+    /// A square card of 8 texels, its left upper corner at `left` and `top` of the page.
+    fn chart(left: u32, top: u32, shape: Shape) -> Chart {
+        let corners = [(0.0, 0.0), (8.0, 0.0), (8.0, 8.0), (0.0, 8.0)];
+        Chart {
+            corners: corners.map(|(x, y)| Vec3::new(x, y, 0.0)).to_vec(),
+            normal: Vec3::Z,
+            tangent: Vec3::X,
+            origin: Vec3::ZERO,
+            to_x: Vec3::X,
+            to_y: Vec3::Y,
+            base: Vec2::ZERO,
+            size: [8, 8],
+            shape,
+            place: [left, top],
+            turned: false,
+        }
+    }
+
+    /// Two tiles side by side on a page whose right half is red, and a copy that shows five columns of
+    /// the right one and three of the left.
+    fn shared() -> (Vec<Chart>, Image) {
+        let charts = vec![
+            chart(0, 0, Shape::Whole),
+            chart(8, 0, Shape::Whole),
+            chart(5, 0, Shape::Window),
+        ];
+        let texel = |i: u32| match i % 16 < 8 {
+            true => [0; 4],
+            false => [255, 0, 0, 255],
+        };
+        let page = Image {
+            name: "page".into(),
+            width: 16,
+            height: 8,
+            rgba: Arc::new((0..16 * 8).flat_map(texel).collect()),
+        };
+        (charts, page)
+    }
+
+    #[test]
+    fn a_copy_belongs_to_the_tile_that_it_shows_most_of() {
+        let (charts, page) = shared();
+        let size = [page.width, page.height];
+        assert_eq!(owners(&charts, size), [None, None, Some(1)]);
+        // One that shows no tile at all still names one.
+        let lost = [charts[0].clone(), chart(8, 0, Shape::Window)];
+        assert_eq!(owners(&lost, size), [None, Some(0)]);
+    }
+
+    #[test]
+    fn a_row_shows_the_tile_and_then_its_copy() {
+        let (charts, page) = shared();
+        let sheet = sheet(&charts, &page);
+        // The other tile has no copies, so there is one row.
+        assert_eq!((sheet.width, sheet.height), (2 * CELL, CELL));
+        let pixel = |x: u32, y: u32| {
+            let at = ((y * sheet.width + x) * 4) as usize;
+            [0, 1, 2, 3].map(|k| sheet.rgba[at + k])
+        };
+        let red = [255, 0, 0, 255];
+        assert_eq!(pixel(CELL / 2, CELL / 2), red);
+        // Of the copy three columns of eight are transparent, the rest is red; around it is paper.
+        assert_eq!(pixel(CELL + CELL / 4, CELL / 2), CARD);
+        assert_eq!(pixel(CELL + CELL / 2, CELL / 2), red);
+        assert_eq!(pixel(CELL, 0), PAPER);
+    }
+}
