@@ -123,8 +123,10 @@ impl<'a> Describer<'a> {
             cards: groups
                 .zip(&made.charts)
                 .zip(owners(&made.charts, made.atlas))
-                .map(|(((group, members), chart), copy_of)| Card {
+                .enumerate()
+                .map(|(index, (((group, members), chart), copy_of))| Card {
                     copy_of,
+                    back: made.back_of(index as u32).map(Chart::rectangle_in_atlas),
                     ..self.card(group, members, chart, &range)
                 })
                 .collect(),
@@ -162,7 +164,8 @@ impl<'a> Describer<'a> {
             subtree: self.common_subtree(members),
             corners: chart.corners.iter().map(|&p| world(frame, p)).collect(),
             copy_of: None,
-            atlas: [chart.place[0], chart.place[1], chart.size[0], chart.size[1]],
+            atlas: chart.rectangle_in_atlas(),
+            back: None,
             shows: group.triangles.len() as u32,
             error_m: shown.rms_distance() * frame.radius,
             area_m2: shown.total * square,

@@ -92,6 +92,8 @@ pub struct Recipe {
     /// F1 that a level may lose where cards share texels on a page of half the size, a quarter and so on,
     /// 0 to 0.2; default 0: every card has texels of its own.
     pub sharing: f64,
+    /// Whether cards whose sides differ visibly get a texture for each, at twice the triangles; not with `sharing`.
+    pub second_sides: bool,
     /// What is wood and what is foliage where shape and material mislead; the first rule that
     /// matches wins. Default: none.
     pub organs: Vec<OrganRule>,
@@ -231,6 +233,7 @@ impl Recipe {
             refine_rounds: 3,
             training_views: 24,
             sharing: 0.0,
+            second_sides: true,
             organs: Vec::new(),
             triangular_cards: true,
             method: Method::OptimalCut,

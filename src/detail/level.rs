@@ -19,6 +19,8 @@ pub struct LevelPlan {
     pub cards: Vec<CardGroup>,
     /// The elements of each card.
     pub members: Vec<Vec<u32>>,
+    /// Cards that are drawn once for each side, in order.
+    pub sided: Vec<u32>,
     /// Wood elements drawn as geometry: element and index of its choice.
     pub tubes: Vec<(u32, u32)>,
     /// Error of the cut, area times length squared, normalised units.

@@ -21,9 +21,9 @@ pub struct Layout {
     pub packer: Packer,
 }
 
-/// One chart for each card, and the size of their page in texels. Where they don't fit on the
-/// largest page, density and gutters fall until they do.
-pub fn lay_out(cards: &[&Card], layout: Layout) -> (Vec<Chart>, [u32; 2]) {
+/// One chart for each card, then one for the back of each of the cards `sided`, and the size of their page
+/// in texels. Where they don't fit on the largest page, density and gutters fall until they do.
+pub fn lay_out(cards: &[&Card], sided: &[u32], layout: Layout) -> (Vec<Chart>, [u32; 2]) {
     let Layout {
         mut density,
         mut pad,
@@ -31,8 +31,8 @@ pub fn lay_out(cards: &[&Card], layout: Layout) -> (Vec<Chart>, [u32; 2]) {
     } = layout;
     loop {
         let page = match packer {
-            Packer::Rectangles => rectangles(cards, density, pad),
-            Packer::Outlines => outlines(cards, density, pad),
+            Packer::Rectangles => rectangles(cards, sided, density, pad),
+            Packer::Outlines => outlines(cards, sided, density, pad),
         };
         match page {
             Some(page) => return page,
@@ -45,10 +45,14 @@ pub fn lay_out(cards: &[&Card], layout: Layout) -> (Vec<Chart>, [u32; 2]) {
 /// 16 wide and are read two by two, sees no other chart.
 const WIDEST: u32 = 12;
 
-fn rectangles(cards: &[&Card], density: f32, pad: f32) -> Option<(Vec<Chart>, [u32; 2])> {
+type Page = (Vec<Chart>, [u32; 2]);
+
+fn rectangles(cards: &[&Card], sided: &[u32], density: f32, pad: f32) -> Option<Page> {
     let with_gutter = |pad: f32| -> Vec<Chart> {
         let charts = cards.par_iter().map(|card| Chart::new(card, density, pad));
-        charts.collect()
+        let mut charts: Vec<Chart> = charts.collect();
+        charts.extend(backs(&charts, sided));
+        charts
     };
     let mut charts = with_gutter(pad);
     let size = pack(&mut charts)?;
@@ -66,23 +70,34 @@ fn rectangles(cards: &[&Card], density: f32, pad: f32) -> Option<(Vec<Chart>, [u
     Some((charts, size))
 }
 
+fn backs(charts: &[Chart], sided: &[u32]) -> Vec<Chart> {
+    let back = |&card: &u32| charts[card as usize].back();
+    sided.iter().map(back).collect()
+}
+
 #[cfg(feature = "xatlas")]
-fn outlines(cards: &[&Card], density: f32, pad: f32) -> Option<(Vec<Chart>, [u32; 2])> {
+fn outlines(cards: &[&Card], sided: &[u32], density: f32, pad: f32) -> Option<Page> {
+    let again = sided.iter().map(|&card| cards[card as usize]);
+    let both: Vec<&Card> = cards.iter().copied().chain(again).collect();
     let outline = |card: &&Card| {
         let chart = Chart::rectangle(card, density, 0.0);
         chart.corners.iter().map(|&p| chart.texel(p)).collect()
     };
-    let outlines: Vec<_> = cards.iter().map(outline).collect();
+    let outlines: Vec<_> = both.iter().map(outline).collect();
     let packed = super::xatlas::pack(&outlines, pad.ceil() as u32, MAX_SIDE)?;
-    let charts = cards.par_iter().zip(&packed.corners);
+    let charts = both.par_iter().zip(&packed.corners);
     let charts = charts.map(|(card, corners)| Chart::placed(card, corners, pad, packed.size));
-    Some((charts.collect(), packed.size))
+    let mut charts: Vec<Chart> = charts.collect();
+    for back in &mut charts[cards.len()..] {
+        *back = back.back();
+    }
+    Some((charts, packed.size))
 }
 
 /// Nobody gets here: [`Packer::check`] refuses outlines before a bake starts.
 #[cfg(not(feature = "xatlas"))]
-fn outlines(cards: &[&Card], density: f32, pad: f32) -> Option<(Vec<Chart>, [u32; 2])> {
-    rectangles(cards, density, pad)
+fn outlines(cards: &[&Card], sided: &[u32], density: f32, pad: f32) -> Option<Page> {
+    rectangles(cards, sided, density, pad)
 }
 
 /// Places all charts on the smallest page that holds them and returns its size in texels, or
@@ -275,7 +290,7 @@ mod tests {
             pad,
             packer,
         };
-        let (charts, [w, h]) = lay_out(&cards, layout);
+        let (charts, [w, h]) = lay_out(&cards, &[3, 40], layout);
         assert!(w.is_power_of_two() && h.is_power_of_two());
         let mut owner = vec![None; (w * h) as usize];
         for (i, chart) in charts.iter().enumerate() {
@@ -287,6 +302,7 @@ mod tests {
                 }
             }
         }
+        assert_eq!(charts.len(), cards.len() + 2);
         for (i, (chart, card)) in charts.iter().zip(&cards).enumerate() {
             let corners: Vec<Vec3> = card.corners().collect();
             for k in 0..corners.len() {

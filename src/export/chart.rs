@@ -217,6 +217,23 @@ impl Chart {
         }
     }
 
+    /// The chart of the same card seen from behind: its texels lie where those of the front do, so
+    /// that both sides have one outline and one alpha.
+    pub fn back(&self) -> Self {
+        Self {
+            corners: self.corners.iter().rev().copied().collect(),
+            normal: -self.normal,
+            ..self.clone()
+        }
+    }
+
+    /// Moves the card towards where its front looks, by a length in normalised units.
+    pub fn lift(&mut self, length: f32) {
+        let step = self.normal * length;
+        self.corners.iter_mut().for_each(|corner| *corner += step);
+        self.origin += step;
+    }
+
     /// Local texel coordinates of a point (projected along the normal).
     pub fn texel(&self, p: Vec3) -> Vec2 {
         let d = p - self.origin;
@@ -257,6 +274,11 @@ impl Chart {
                 .map_or(0, |x| x + 1),
         };
         (0..height).map(length).collect()
+    }
+
+    /// Left, top, width and height of its rectangle in the atlas, texels.
+    pub fn rectangle_in_atlas(&self) -> [u32; 4] {
+        [self.place[0], self.place[1], self.size[0], self.size[1]]
     }
 
     /// Where the local texel (x, y) lies in the atlas.

@@ -38,6 +38,9 @@ pub struct BakeOptions {
 pub struct Foliage {
     /// One chart for each card.
     pub charts: Vec<Chart>,
+    /// Charts of the backs of cards whose sides differ, and the fronts' indices, until
+    /// [`Foliage::add_backs`].
+    pub backs: Vec<(u32, Chart)>,
     /// Size of the page in texels.
     pub size: [u32; 2],
     /// The page, row by row; colours and normals are already bled into empty texels.
@@ -52,12 +55,14 @@ pub struct Foliage {
 const BATCH: usize = 256;
 
 impl Foliage {
-    /// Lays out and projects all cards.
-    pub fn bake(model: &Model, groups: &[CardGroup], options: BakeOptions) -> Self {
+    /// Lays out and projects all cards, those of `sided` from both sides.
+    pub fn bake(model: &Model, groups: &[CardGroup], sided: &[u32], options: BakeOptions) -> Self {
         let cards: Vec<&Card> = groups.iter().map(|g| &g.card).collect();
-        let (charts, size) = lay_out(&cards, options.layout);
+        let (mut charts, size) = lay_out(&cards, sided, options.layout);
+        let backs = charts.split_off(groups.len());
         let mut foliage = Self::of(charts, size);
         foliage.project(model, groups, options.samples);
+        foliage.project_backs(model, groups, options.samples, sided, backs);
         foliage.threshold(0.5, 0);
         foliage
     }
@@ -69,6 +74,7 @@ impl Foliage {
             owned: vec![false; texels.len()],
             alpha: vec![0; texels.len()],
             charts,
+            backs: Vec::new(),
             size,
             texels,
         }
@@ -88,16 +94,65 @@ impl Foliage {
                 })
                 .collect();
             for (chart, projection) in projected {
-                for y in 0..chart.size[1] {
-                    for x in (0..chart.size[0]).filter(|&x| chart.owns(x, y)) {
-                        let [ax, ay] = chart.in_atlas(x, y);
-                        let at = (ay * width + ax) as usize;
-                        let texel = projection.texels[(y * chart.size[0] + x) as usize];
-                        self.texels[at] = texel.into();
-                        self.owned[at] = true;
-                    }
+                for (local, at) in placed_texels(chart, width) {
+                    self.texels[at] = projection.texels[local].into();
+                    self.owned[at] = true;
                 }
             }
+        }
+    }
+
+    /// Draws the backs. Their texels are nobody's until alpha is final: what is fitted and matched is the fronts.
+    fn project_backs(
+        &mut self,
+        model: &Model,
+        groups: &[CardGroup],
+        samples: u32,
+        sided: &[u32],
+        backs: Vec<Chart>,
+    ) {
+        let drawn: Vec<_> = sided
+            .par_iter()
+            .zip(&backs)
+            .map(|(&card, back)| {
+                let triangles = groups[card as usize].triangles.iter().copied();
+                project(model, triangles, back, samples)
+            })
+            .collect();
+        for (back, projection) in backs.iter().zip(drawn) {
+            for (local, at) in placed_texels(back, self.size[0]) {
+                self.texels[at] = projection.texels[local].into();
+            }
+        }
+        self.backs = sided.iter().copied().zip(backs).collect();
+    }
+
+    /// Draws the backs of cards that have one: they take over the fronts' alpha, and both sides move apart by
+    /// `gap` (normalised units), so that each hides the other.
+    pub fn add_backs(&mut self, gap: f32) {
+        let width = self.size[0];
+        for (front, mut back) in std::mem::take(&mut self.backs) {
+            let front = &mut self.charts[front as usize];
+            for (local, at) in placed_texels(&back, width) {
+                let texel = Vec2::new(
+                    (local as u32 % back.size[0]) as f32 + 0.5,
+                    (local as u32 / back.size[0]) as f32 + 0.5,
+                );
+                let there = front.texel(back.point(texel)).max(Vec2::ZERO);
+                let [x, y] = [there.x, there.y].map(|t| t as u32);
+                let seen = x < front.size[0] && y < front.size[1] && front.owns(x, y);
+                self.alpha[at] = match seen {
+                    true => {
+                        let [x, y] = front.in_atlas(x, y);
+                        self.alpha[(y * width + x) as usize]
+                    }
+                    false => 0,
+                };
+                self.owned[at] = true;
+            }
+            front.lift(0.5 * gap);
+            back.lift(0.5 * gap);
+            self.charts.push(back);
         }
     }
 
@@ -178,6 +233,15 @@ impl Foliage {
             }),
         ]
     }
+}
+
+/// The texels of a chart: their indices in the chart and on a page of the given width.
+fn placed_texels(chart: &Chart, width: u32) -> impl Iterator<Item = (usize, usize)> + '_ {
+    let all = (0..chart.size[1]).flat_map(|y| (0..chart.size[0]).map(move |x| (x, y)));
+    all.filter(|&(x, y)| chart.owns(x, y)).map(move |(x, y)| {
+        let [ax, ay] = chart.in_atlas(x, y);
+        ((y * chart.size[0] + x) as usize, (ay * width + ax) as usize)
+    })
 }
 
 /// Names of the images of [`Foliage::images`].

@@ -22,7 +22,7 @@ pub const SUFFIX: &str = ".pleach.ron";
 /// What [`Manifest::format`] says.
 pub const FORMAT: &str = "pleach";
 /// Version of this form.
-pub const VERSION: u32 = 4;
+pub const VERSION: u32 = 5;
 
 /// The whole manifest.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -153,6 +153,8 @@ pub struct Card {
     pub corners: Vec<[f32; 3]>,
     /// Left, top, width, height in the atlas, texels. Two triangular cards may share one.
     pub atlas: [u32; 4],
+    /// The same of its back, where that has texels of its own: the card is then drawn once for each side.
+    pub back: Option<[u32; 4]>,
     /// Sharing reference: the card of this level that has most of the texels that this one shows; `None` where they
     /// are its own.
     pub copy_of: Option<u32>,

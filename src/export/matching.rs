@@ -280,7 +280,7 @@ mod tests {
             },
             samples: 1,
         };
-        let foliage = Foliage::bake(&Model::default(), &[group], options);
+        let foliage = Foliage::bake(&Model::default(), &[group], &[], options);
         let width = foliage.size[0];
         let mut wanted = 0;
         let score = (0..foliage.alpha.len() as u32)

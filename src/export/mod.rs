@@ -23,6 +23,7 @@ pub mod png;
 pub mod project;
 pub mod refine;
 pub mod share;
+pub mod sides;
 pub mod surface;
 pub mod tangent;
 pub mod texel;

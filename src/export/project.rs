@@ -73,7 +73,8 @@ pub fn project(
 fn draw(model: &Model, t: u32, chart: &Chart, samples: f32, [sw, sh]: [u32; 2], hits: &mut [Hit]) {
     let corners = model.corners(t);
     let p = corners.map(|c| chart.texel(c) * samples);
-    let depth = corners.map(|c| (c - chart.origin).dot(chart.normal));
+    let behind = behind(model, t, corners, chart);
+    let depth = corners.map(|c| (c - chart.origin).dot(chart.normal) - behind);
     let (side, other) = (p[1] - p[0], p[2] - p[0]);
     let double_area = side.perp_dot(other);
     if double_area.abs() < 1e-12 {
@@ -106,6 +107,18 @@ fn draw(model: &Model, t: u32, chart: &Chart, samples: f32, [sw, sh]: [u32; 2], 
                 };
             }
         }
+    }
+}
+
+/// How far a triangle steps back, normalised units: the back of a sheet of which only the front is drawn
+/// shows nothing where another sheet lies in its place, as two sheets make a leaf of two colours.
+const BACK_STEP: f32 = 1e-5;
+
+fn behind(model: &Model, t: u32, [a, b, c]: [Vec3; 3], chart: &Chart) -> f32 {
+    let turned = || (b - a).cross(c - a).dot(chart.normal) < 0.0;
+    match model.material_of(t).double_sided {
+        false if turned() => BACK_STEP,
+        _ => 0.0,
     }
 }
 

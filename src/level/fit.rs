@@ -34,6 +34,10 @@ const WOOD_TRIES: u32 = 4;
 /// Excess of the covered area that is left alone.
 const WOOD_TOLERANCE: f64 = 0.005;
 
+/// Distance of the two sides of a card that has a texture for each, pixels where the level starts: less than an eye sees,
+/// more than a depth buffer of 24 bits resolves there.
+const GAP_PX: f32 = 0.25;
+
 /// A plan with its wood and texels.
 pub struct Fitted {
     pub(super) request: LevelRequest,
@@ -60,6 +64,7 @@ impl Baker<'_> {
         let mut foliage = Foliage::bake(
             &self.tree.model,
             &plan.cards,
+            &plan.sided,
             BakeOptions {
                 layout: Layout {
                     density: self.density(request),
@@ -192,7 +197,9 @@ impl Fitted {
     }
 
     /// Bleeds the texels and joins wood and cards.
-    pub(super) fn level(mut self) -> Level {
+    pub(super) fn level(mut self, tree_height: f32) -> Level {
+        self.foliage
+            .add_backs(GAP_PX * tree_height / self.request.height_px);
         self.foliage.bleed();
         let mut scene = self.wood;
         let mut surface = self.foliage.surface();

@@ -2,6 +2,7 @@
 
 mod fit;
 mod share;
+mod sided;
 
 use glam::Vec3;
 
@@ -100,7 +101,7 @@ pub struct Level {
     pub plan: LevelPlan,
     /// Threshold and floor of the alpha, and what they gave.
     pub matched: Matched,
-    /// Where each card lies in the atlas.
+    /// Where each card lies in the atlas, then the backs of those that have one.
     pub charts: Vec<Chart>,
     /// Size of the atlas in texels.
     pub atlas: [u32; 2],
@@ -112,6 +113,12 @@ pub struct Level {
 }
 
 impl Level {
+    /// Where the back of a card lies, if it has texels of its own.
+    pub fn back_of(&self, card: u32) -> Option<&Chart> {
+        let nth = self.plan.sided.iter().position(|&sided| sided == card)?;
+        self.charts.get(self.plan.cards.len() + nth)
+    }
+
     /// The page of its cards: base colour with alpha.
     pub fn page(&self) -> Option<&Image> {
         let first = self.scene.images.len().checked_sub(IMAGES.len())?;
@@ -205,9 +212,12 @@ impl Baker<'_> {
                 neighbours: 12,
             },
         };
+        if self.recipe.method == Method::OptimalCut {
+            return self.sided(request.triangles, |budget| planner.plan(budget));
+        }
         let cut = planner.plan(request.triangles)?;
         let centers: Vec<Vec3> = self.tree.leaves.iter().map(|l| l.center).collect();
-        if self.recipe.method == Method::OptimalCut || centers.is_empty() {
+        if centers.is_empty() {
             return Some(cut);
         }
         let tried = |billboard| self.recipe.billboards.contains(&billboard);

@@ -15,10 +15,11 @@ const PASSES: f64 = 6.0;
 impl Baker<'_> {
     /// A level with all that shares its texels.
     pub(super) fn finished(&self, fitted: Fitted, watch: &dyn Watch) -> Result<Level> {
+        let height = self.original.height;
         let shared = self.shared(&fitted, watch)?;
         Ok(Level {
-            shared: shared.into_iter().rev().map(Fitted::level).collect(),
-            ..fitted.level()
+            shared: shared.into_iter().rev().map(|f| f.level(height)).collect(),
+            ..fitted.level(height)
         })
     }
 

@@ -10,7 +10,7 @@
 use std::f32::consts::{FRAC_1_SQRT_2, PI};
 use std::sync::LazyLock;
 
-use super::lab::{lab, opponent, rgb_of_opponent};
+use crate::space::lab::{lab, opponent, rgb_of_opponent};
 
 /// Pixels a degree of visual angle: 0.7 m from a screen of 0.7 m with 3840 pixels, the default of
 /// the paper.

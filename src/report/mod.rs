@@ -12,7 +12,6 @@ mod drawable;
 mod evaluate;
 mod flip;
 mod judge;
-mod lab;
 mod page;
 mod reference;
 pub mod schema;

@@ -1,9 +1,9 @@
 //! One model from one view at one size, ready to be compared: its layers over a neutral ground.
 
 use super::flip::{Seen, columns, rows};
-use super::lab::lab;
 use super::schema::ViewAppearance;
 use super::silhouette::share;
+use crate::space::lab::lab;
 use crate::space::raster::{Layers, srgb_from_linear};
 
 /// Light of the ground that trees stand before: half of white, darker than sky, lighter than leaves.

@@ -10,6 +10,8 @@ pub mod glb;
 #[cfg(feature = "bake")]
 pub mod grid;
 pub mod hull;
+#[cfg(feature = "bake")]
+pub mod lab;
 mod min_triangle;
 pub mod polyline;
 #[cfg(feature = "bake")]

@@ -61,7 +61,7 @@ fn row(manifest: &Manifest, level: &Level) {
             packer,
         };
         let began = Instant::now();
-        let (_, [w, h]) = lay_out(&cards.iter().collect::<Vec<_>>(), layout);
+        let (_, [w, h]) = lay_out(&cards.iter().collect::<Vec<_>>(), &[], layout);
         println!(
             "{:36} {:6} cards  {:10}  {w:4} x {h:4}  {:.3} used  {:5.2} s",
             level.file,

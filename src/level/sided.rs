@@ -1,0 +1,77 @@
+//! Cards whose sides differ visibly are drawn once for each side, within the level's budget.
+
+use super::Baker;
+use crate::detail::level::LevelPlan;
+use crate::export::sides::{VISIBLE_DELTA_E, differences};
+
+/// Share of the cards' area that has to differ before a level pays for it: a second side costs as much as
+/// the first, and what a few cards show from behind is lost in the crown.
+const LEAST_SHARE: f64 = 0.05;
+
+/// Times that a smaller budget is tried.
+const TRIES: u32 = 3;
+
+impl Baker<'_> {
+    /// The plan that `make` gives for so many triangles, less where some go to second sides.
+    pub(super) fn sided(
+        &self,
+        budget: u64,
+        make: impl Fn(u64) -> Option<LevelPlan>,
+    ) -> Option<LevelPlan> {
+        let mut plan = make(budget)?;
+        // Copies of tiles are seen from behind as well: they have no side of their own.
+        if !self.recipe.second_sides || self.recipe.sharing > 0.0 {
+            return Some(plan);
+        }
+        let mut sided = self.differing(&plan);
+        for _ in 0..TRIES {
+            let (own, more) = (self.cost(&plan), triangles_of(&plan, &sided));
+            if own + more <= budget {
+                break;
+            }
+            let Some(coarser) = make(budget * own / (own + more)) else {
+                break;
+            };
+            plan = coarser;
+            sided = self.differing(&plan);
+        }
+        let mut left = budget.saturating_sub(self.cost(&plan));
+        sided.retain(|&card| {
+            let cost = triangles_of(&plan, &[card]);
+            let fits = cost <= left;
+            left -= if fits { cost } else { 0 };
+            fits
+        });
+        plan.sided = sided;
+        Some(plan)
+    }
+
+    /// Cards whose sides differ visibly; none where that is little of them all.
+    fn differing(&self, plan: &LevelPlan) -> Vec<u32> {
+        let found = differences(&self.tree.model, &plan.cards);
+        let differs = |&card: &u32| found[card as usize] >= VISIBLE_DELTA_E;
+        let sided: Vec<u32> = (0..plan.cards.len() as u32).filter(differs).collect();
+        let area = |card: u32| f64::from(plan.cards[card as usize].card.area());
+        let all: f64 = (0..plan.cards.len() as u32).map(area).sum();
+        match sided.iter().map(|&card| area(card)).sum::<f64>() >= LEAST_SHARE * all {
+            true => sided,
+            false => Vec::new(),
+        }
+    }
+
+    /// Triangles of a plan.
+    fn cost(&self, plan: &LevelPlan) -> u64 {
+        let cards = plan.cards.iter().map(|g| g.card.triangles() as u64);
+        let tubes = plan.tubes.iter().filter_map(|&(element, choice)| {
+            let chain = self.elements[element as usize].chain?;
+            let options = &self.wood.tube_options(chain).options;
+            Some(u64::from(options[choice as usize].triangles))
+        });
+        cards.sum::<u64>() + tubes.sum::<u64>()
+    }
+}
+
+fn triangles_of(plan: &LevelPlan, cards: &[u32]) -> u64 {
+    let cost = |&card: &u32| plan.cards[card as usize].card.triangles() as u64;
+    cards.iter().map(cost).sum()
+}

@@ -1,0 +1,171 @@
+//! Leaves with pale undersides: cards whose sides differ visibly show each side's own colours.
+
+use std::path::Path;
+
+use glam::Vec3;
+use pleach::botany::load::load;
+use pleach::botany::model::Image;
+use pleach::export::manifest::{Level, Manifest};
+use pleach::pipeline::{Limit, Request, Wanted, bake};
+use pleach::recipe::Recipe;
+use pleach::space::glb::GlbBuilder;
+use pleach::watch::Unwatched;
+use serde_json::json;
+
+/// Triangles of the level.
+const BUDGET: u64 = 200;
+
+/// A trunk, and leaves that lie nearly level: green above, red below, each side a sheet of its own.
+fn two_toned(file: &Path) {
+    let mut glb = GlbBuilder::default();
+    let random = |i: u32, k: u32| ((i * 7919 + k * 104_729) as f32 * 0.618_034).fract() - 0.5;
+    let (mut crown, mut above, mut below) = (Vec::new(), Vec::new(), Vec::new());
+    for i in 0..300 {
+        let center = Vec3::new(
+            random(i, 1) * 4.0,
+            4.0 + random(i, 2) * 4.0,
+            random(i, 3) * 4.0,
+        );
+        let u = Vec3::new(random(i, 4), 0.2 * random(i, 5), random(i, 6)).normalize_or(Vec3::X);
+        let v = Vec3::Y.cross(u).normalize_or(Vec3::X) * 0.2;
+        let u = u * 0.2;
+        let at = crown.len() as u32;
+        crown.extend([
+            center - u - v,
+            center - u + v,
+            center + u + v,
+            center + u - v,
+        ]);
+        for [a, b, c] in [[at, at + 2, at + 1], [at, at + 3, at + 2]] {
+            above.push([a, b, c]);
+            below.push([a, c, b]);
+        }
+    }
+    if (crown[above[0][1] as usize] - crown[above[0][0] as usize])
+        .cross(crown[above[0][2] as usize] - crown[above[0][0] as usize])
+        .y
+        < 0.0
+    {
+        std::mem::swap(&mut above, &mut below);
+    }
+    let (mut wood, mut bark) = (Vec::new(), Vec::new());
+    for ring in 0..6u32 {
+        for side in 0..8u32 {
+            let angle = side as f32 * std::f32::consts::FRAC_PI_4;
+            wood.push(Vec3::new(angle.cos() * 0.2, ring as f32, angle.sin() * 0.2));
+            if ring > 0 {
+                let [a, b] = [side, (side + 1) % 8].map(|s| (ring - 1) * 8 + s);
+                bark.extend([[a, a + 8, b], [b, a + 8, b + 8]]);
+            }
+        }
+    }
+    let mut primitive = |points: &[Vec3], triangles: &[[u32; 3]], material: u32| {
+        let position = glb.positions(points);
+        let indices = glb.indices(triangles, points.len());
+        json!({ "attributes": { "POSITION": position }, "indices": indices, "material": material })
+    };
+    let primitives = [
+        primitive(&wood, &bark, 0),
+        primitive(&crown, &above, 1),
+        primitive(&crown, &below, 2),
+    ];
+    let color = |name: &str, rgba: [f32; 4]| json!({ "name": name, "pbrMetallicRoughness": { "baseColorFactor": rgba } });
+    let root = json!({
+        "asset": { "version": "2.0" }, "scene": 0, "scenes": [{ "nodes": [0] }],
+        "nodes": [{ "mesh": 0 }], "meshes": [{ "primitives": primitives }],
+        "materials": [
+            color("bark", [0.3, 0.2, 0.1, 1.0]), color("leaf", [0.0, 0.5, 0.0, 1.0]), color("underside", [0.5, 0.0, 0.0, 1.0]),
+        ],
+    });
+    std::fs::write(file, glb.finish(root)).unwrap();
+}
+
+/// The level's cards and the page that they show.
+fn baked(folder: &Path, second_sides: bool) -> (Level, Image) {
+    let input = folder.join("tree.glb");
+    two_toned(&input);
+    let output = folder.join("package");
+    let request = Request {
+        input,
+        output: output.clone(),
+        wanted: Wanted::Limits(vec![Limit::Count(BUDGET)]),
+        recipe: Recipe {
+            second_sides,
+            // Rectangles, so that a card's texels are all that its rectangle holds.
+            triangular_cards: false,
+            ..Recipe::draft()
+        },
+        force: true,
+        accept: true,
+        ..Request::default()
+    };
+    bake(&request, &Unwatched).unwrap();
+    let manifest = std::fs::read_to_string(output.join("tree.pleach.ron")).unwrap();
+    let manifest = Manifest::from_ron(&manifest, Path::new("tree.pleach.ron")).unwrap();
+    let model = load(&output.join("tree_LOD1.glb")).unwrap();
+    let page = model.images.iter().find(|i| i.name.contains("base_color"));
+    (manifest.levels[1].clone(), page.unwrap().clone())
+}
+
+/// Mean red and green of the opaque texels of a rectangle.
+fn red_and_green(page: &Image, [left, top, width, height]: [u32; 4]) -> Option<[f64; 2]> {
+    let texels =
+        (top..top + height).flat_map(|y| (left..left + width).map(move |x| y * page.width + x));
+    let opaque: Vec<&[u8]> = texels
+        .map(|at| &page.rgba[at as usize * 4..][..4])
+        .filter(|t| t[3] >= 128)
+        .collect();
+    let mean = |channel: usize| {
+        opaque.iter().map(|t| f64::from(t[channel])).sum::<f64>() / opaque.len() as f64
+    };
+    (!opaque.is_empty()).then(|| [mean(0), mean(1)])
+}
+
+fn looks_up(corners: &[[f32; 3]]) -> f32 {
+    let [a, b, c] = [0, 1, 2].map(|i| Vec3::from(corners[i]));
+    (b - a).cross(c - a).normalize().y
+}
+
+#[test]
+fn a_card_is_green_from_above_and_red_from_below() {
+    let folder = tempfile::tempdir().unwrap();
+    let (level, page) = baked(folder.path(), true);
+    assert!(level.triangles <= BUDGET, "{}", level.triangles);
+    let mut seen = 0;
+    for card in &level.cards {
+        let up = looks_up(&card.corners);
+        let (Some(back), true) = (card.back, up.abs() > 0.8) else {
+            continue;
+        };
+        let sides = [card.atlas, back].map(|rectangle| red_and_green(&page, rectangle));
+        let [Some([red, green]), Some([back_red, back_green])] = sides else {
+            continue;
+        };
+        // The front is what the card's normal looks to.
+        assert_eq!(
+            green > red,
+            up > 0.0,
+            "front {red:.0} {green:.0}, up {up:.2}"
+        );
+        assert_eq!(
+            back_green > back_red,
+            up < 0.0,
+            "back {back_red:.0} {back_green:.0}, up {up:.2}"
+        );
+        seen += 1;
+    }
+    assert!(
+        seen * 2 > level.cards.len(),
+        "{seen} of {}",
+        level.cards.len()
+    );
+}
+
+#[test]
+fn without_second_sides_cards_have_one_texture_and_are_more() {
+    let folder = tempfile::tempdir().unwrap();
+    let (level, _) = baked(folder.path(), false);
+    assert!(level.cards.iter().all(|card| card.back.is_none()));
+    let (sided, _) = baked(folder.path(), true);
+    assert!(level.cards.len() > sided.cards.len());
+}
