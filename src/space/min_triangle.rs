@@ -25,18 +25,22 @@ pub fn min_triangle(hull: &[Vec2]) -> [Vec2; 3] {
         .map(|p| p.as_dvec2())
         .collect();
     let n = hull.len();
-    let mut best: Option<(f64, [DVec2; 3])> = None;
+    let sides: Vec<Side> = (0..n)
+        .map(|k| Side {
+            at: hull[k],
+            along: (hull[(k + 1) % n] - hull[k]).normalize(),
+        })
+        .collect();
+    let mut best = Smallest {
+        hull: &hull,
+        found: None,
+    };
     for i in 0..n {
-        for j in 0..n {
-            if let Some(triangle) = (i != j).then(|| smallest_third(&hull, i, j)).flatten() {
-                let size = cross(triangle[1] - triangle[0], triangle[2] - triangle[0]);
-                if size > 0.0 && best.is_none_or(|(least, _)| size < least) {
-                    best = Some((size, triangle));
-                }
-            }
+        for j in (0..n).filter(|&j| i != j) {
+            best.third_sides(&sides, i, j);
         }
     }
-    match best {
+    match best.found {
         Some((_, triangle)) => triangle.map(|p| p.as_vec2()),
         None => triangle_of_rect(&min_rect(
             &hull.iter().map(|p| p.as_vec2()).collect::<Vec<_>>(),
@@ -44,46 +48,69 @@ pub fn min_triangle(hull: &[Vec2]) -> [Vec2; 3] {
     }
 }
 
-/// The smallest triangle with sides along hull edges `i` and `j`, where `j` follows `i` at the
-/// triangle's corner between them. The third side runs over the hull corners after `j`.
-fn smallest_third(hull: &[DVec2], i: usize, j: usize) -> Option<[DVec2; 3]> {
-    let n = hull.len();
-    let edge = |k: usize| (hull[k % n], (hull[(k + 1) % n] - hull[k % n]).normalize());
-    let ((pi, di), (pj, dj)) = (edge(i), edge(j));
-    if cross(di, dj) <= 1e-9 {
-        return None;
-    }
-    let apex = meet(pi, di, pj, dj)?;
-    // The far side meets line i before the hull and line j behind it, and keeps the hull to its left.
-    let close = |p: DVec2, d: DVec2| {
-        let (a, b) = (meet(p, d, pj, dj)?, meet(p, d, pi, di)?);
-        let holds = hull.iter().all(|&q| cross(d, q - p) >= -1e-9);
-        let ahead = (a - apex).dot(dj) > 0.0 && (b - apex).dot(di) < 0.0 && (b - a).dot(d) > 0.0;
-        (holds && ahead).then_some([apex, a, b])
-    };
-    let mut best: Option<(f64, [DVec2; 3])> = None;
-    let mut keep = |triangle: Option<[DVec2; 3]>| {
-        if let Some(t) = triangle {
-            let size = cross(t[1] - t[0], t[2] - t[0]);
-            if best.is_none_or(|(least, _)| size < least) {
-                best = Some((size, t));
+/// A line along a hull edge.
+struct Side {
+    at: DVec2,
+    /// Unit direction, the hull to its left.
+    along: DVec2,
+}
+
+/// The smallest triangle so far, with twice its area.
+struct Smallest<'h> {
+    hull: &'h [DVec2],
+    found: Option<(f64, [DVec2; 3])>,
+}
+
+impl Smallest<'_> {
+    /// Tries the triangles with sides along hull edges `i` and `j`, where `j` follows `i` at the
+    /// triangle's corner between them. The third side runs over the hull corners after `j`.
+    fn third_sides(&mut self, sides: &[Side], i: usize, j: usize) {
+        let both = [&sides[i], &sides[j]];
+        let [(pi, di), (pj, dj)] = both.map(|side| (side.at, side.along));
+        if cross(di, dj) <= 1e-9 {
+            return;
+        }
+        let Some(apex) = meet(pi, di, pj, dj) else {
+            return;
+        };
+        for (number, k) in sides.iter().enumerate() {
+            self.close(apex, both, number, k.along);
+            // The side whose midpoint is p: from a on line j to b on line i with a + b = 2 p.
+            let across = 2.0 * (k.at - apex);
+            let (s, t) = (
+                cross(across, di) / cross(dj, di),
+                cross(across, dj) / cross(di, dj),
+            );
+            if let Some(direction) = (di * t - dj * s).try_normalize() {
+                self.close(apex, both, number, direction);
             }
         }
-    };
-    for k in 0..n {
-        let (p, d) = edge(k);
-        keep(close(p, d));
-        // The side whose midpoint is p: from a on line j to b on line i with a + b = 2 p.
-        let across = 2.0 * (p - apex);
-        let (s, t) = (
-            cross(across, di) / cross(dj, di),
-            cross(across, dj) / cross(di, dj),
-        );
-        if let Some(direction) = (di * t - dj * s).try_normalize() {
-            keep(close(p, direction));
+    }
+
+    /// Keeps the triangle whose far side runs through corner `k` of the hull along `d`, if it is one,
+    /// smaller than those before, and holds the hull. What is found out fastest is asked first.
+    fn close(&mut self, apex: DVec2, [before, after]: [&Side; 2], k: usize, d: DVec2) {
+        let (di, dj) = (before.along, after.along);
+        if cross(dj, d) <= 0.0 || cross(d, di) <= 0.0 {
+            return;
+        }
+        let (hull, n, p) = (self.hull, self.hull.len(), self.hull[k]);
+        let holds = |q: DVec2| cross(d, q - p) >= -1e-9;
+        if !holds(hull[(k + 1) % n]) || !holds(hull[(k + n - 1) % n]) {
+            return;
+        }
+        // The far side meets line i before the hull and line j behind it, and keeps the hull to its left.
+        let meet = |side: &Side| meet(p, d, side.at, side.along);
+        let (Some(a), Some(b)) = (meet(after), meet(before)) else {
+            return;
+        };
+        let ahead = (a - apex).dot(dj) > 0.0 && (b - apex).dot(di) < 0.0 && (b - a).dot(d) > 0.0;
+        let size = cross(a - apex, b - apex);
+        let smaller = size > 0.0 && self.found.is_none_or(|(least, _)| size < least);
+        if ahead && smaller && hull.iter().all(|&q| holds(q)) {
+            self.found = Some((size, [apex, a, b]));
         }
     }
-    best.map(|(_, triangle)| triangle)
 }
 
 /// A triangle around a rectangle, of twice its area.
