@@ -18,9 +18,6 @@ use crate::space::grid::nearest_neighbours;
 /// Neighbours with which an element may merge at first.
 const NEIGHBOURS: usize = 10;
 
-/// A heap of this many merges is not worth cleaning.
-const LEAST_HEAP: usize = 4096;
-
 /// A forest of binary merges. Nodes 0..n are the elements, later nodes are merges, in the order
 /// in which they happened; children come before parents.
 #[derive(Clone, Debug, Default)]
@@ -82,7 +79,7 @@ fn least_eigenvalue(s: &DMat3, trace: f64) -> f64 {
 }
 
 /// One possible merge; ordered by cost, then by the ids, so that equal costs have one order.
-#[derive(PartialEq)]
+#[derive(Clone, Copy, PartialEq)]
 struct Merge {
     cost: f64,
     a: u32,
@@ -104,6 +101,52 @@ impl Ord for Merge {
     }
 }
 
+/// All merges that may happen. Each belongs to one group, and of each group only the best one waits
+/// in the heap: its next best takes its place when the partner has gone. So the heap holds one entry a
+/// group instead of one a neighbour, and the order of merges is the same.
+#[derive(Default)]
+struct Waiting {
+    heap: BinaryHeap<Reverse<Merge>>,
+    /// Of each group, the best last.
+    own: Vec<Vec<Merge>>,
+}
+
+impl Waiting {
+    /// Adds merges of the group `owner`, which is the later one of each.
+    fn add(&mut self, owner: u32, merges: impl Iterator<Item = Merge>) {
+        let owner = owner as usize;
+        if self.own.len() <= owner {
+            self.own.resize_with(owner + 1, Vec::new);
+        }
+        self.own[owner].extend(merges);
+        self.own[owner].sort_unstable_by(|a, b| b.cmp(a));
+        self.own[owner].shrink_to_fit();
+        self.next_of(owner as u32);
+    }
+
+    fn next_of(&mut self, owner: u32) {
+        let next = self.own[owner as usize].pop();
+        self.heap.extend(next.map(Reverse));
+    }
+
+    /// The least merge of groups that are both alive.
+    fn pop(&mut self, alive: &[bool]) -> Option<Merge> {
+        while let Some(Reverse(merge)) = self.heap.pop() {
+            let (owner, other) = (merge.a.max(merge.b), merge.a.min(merge.b));
+            match (alive[owner as usize], alive[other as usize]) {
+                (true, true) => return Some(merge),
+                (true, false) => {
+                    let own = &mut self.own[owner as usize];
+                    while own.pop_if(|m| !alive[m.a.min(m.b) as usize]).is_some() {}
+                    self.next_of(owner);
+                }
+                (false, _) => self.own[owner as usize] = Vec::new(),
+            }
+        }
+        None
+    }
+}
+
 /// Merges elements bottom-up until one group (or nothing that touches) is left.
 pub fn merge(elements: &[Element], locality: f64) -> Hierarchy {
     let n = elements.len();
@@ -114,23 +157,18 @@ pub fn merge(elements: &[Element], locality: f64) -> Hierarchy {
     let mut near = neighbours(elements, &centers);
     let mut alive = vec![true; n];
     let mut merges = Vec::with_capacity(n);
-    let mut heap = BinaryHeap::new();
-    let cost_of = |moments: &[Moments], error: &[f64], a: u32, b: u32| {
+    let mut waiting = Waiting::default();
+    let merge_of = |moments: &[Moments], error: &[f64], a: u32, b: u32| {
         let together = moments[a as usize].merged(&moments[b as usize]);
-        plane_error(&together, locality) - error[a as usize] - error[b as usize]
+        let cost = plane_error(&together, locality) - error[a as usize] - error[b as usize];
+        Merge { cost, a, b }
     };
-    for a in 0..n as u32 {
-        for &b in near[a as usize].iter().filter(|&&b| a < b) {
-            let cost = cost_of(&moments, &error, a, b);
-            heap.push(Reverse(Merge { cost, a, b }));
-        }
+    for b in 0..n as u32 {
+        let before = near[b as usize].iter().filter(|&&a| a < b);
+        waiting.add(b, before.map(|&a| merge_of(&moments, &error, a, b)));
     }
-    let mut most = heap.len().max(LEAST_HEAP);
     loop {
-        while let Some(Reverse(Merge { a, b, .. })) = heap.pop() {
-            if !alive[a as usize] || !alive[b as usize] {
-                continue;
-            }
+        while let Some(Merge { a, b, .. }) = waiting.pop(&alive) {
             let c = moments.len() as u32;
             (alive[a as usize], alive[b as usize]) = (false, false);
             let joined = moments[a as usize].merged(&moments[b as usize]);
@@ -150,16 +188,12 @@ pub fn merge(elements: &[Element], locality: f64) -> Hierarchy {
                     list.retain(|&y| alive[y as usize]);
                 }
                 list.push(c);
-                let cost = cost_of(&moments, &error, x, c);
-                heap.push(Reverse(Merge { cost, a: x, b: c }));
             }
+            waiting.own[a.max(b) as usize] = Vec::new();
+            waiting.own[a.min(b) as usize] = Vec::new();
+            waiting.add(c, around.iter().map(|&x| merge_of(&moments, &error, x, c)));
             around.shrink_to_fit();
             near.push(around);
-            // Most of what waits has died meanwhile, and would take most of the memory.
-            if heap.len() > 2 * most {
-                heap.retain(|Reverse(m)| alive[m.a as usize] && alive[m.b as usize]);
-                most = heap.len().max(LEAST_HEAP);
-            }
         }
         // The neighbourhood graph may fall into pieces: join each piece to the ones nearest.
         let roots: Vec<u32> = (0..moments.len() as u32)
@@ -183,14 +217,18 @@ pub fn merge(elements: &[Element], locality: f64) -> Hierarchy {
             .iter()
             .map(|&r| moments[r as usize].mean.as_vec3())
             .collect();
+        let mut of_owner = vec![Vec::new(); roots.len()];
         for (i, others) in nearest_neighbours(&centers, NEIGHBOURS).iter().enumerate() {
             for &j in others {
                 let (a, b) = (roots[i], roots[j as usize]);
                 near[a as usize].push(b);
                 near[b as usize].push(a);
-                let cost = cost_of(&moments, &error, a, b);
-                heap.push(Reverse(Merge { cost, a, b }));
+                // Roots ascend: the later place is the later group.
+                of_owner[i.max(j as usize)].push(merge_of(&moments, &error, a, b));
             }
+        }
+        for (&owner, merges) in roots.iter().zip(of_owner) {
+            waiting.add(owner, merges.into_iter());
         }
     }
 }
