@@ -10,29 +10,10 @@
 use rayon::prelude::*;
 
 use super::foliage::Foliage;
+use super::level_scene::{AreaGoal, LevelScene, WoodSeen};
 use super::surface::Surface;
-use crate::space::raster::{
-    Camera, Geometry, Material, Mips, Sampling, Scene, Scores, Texture, coverage,
-    coverage_multisampled, critical,
-};
+use crate::space::raster::{Critical, ScorePage, Scores};
 use crate::space::root::Search;
-
-/// What the level should cover.
-#[derive(Clone, Debug)]
-pub struct AreaGoal {
-    /// Cameras that see the base level of the atlas.
-    pub near: Vec<Camera>,
-    /// The original's covered area in pixels, summed over the near cameras.
-    pub near_area: f64,
-    /// Cameras where the level starts.
-    pub own: Vec<Camera>,
-    /// The original's covered area in pixels, summed over them.
-    pub own_area: f64,
-    /// Cameras at twice that distance.
-    pub far: Vec<Camera>,
-    /// The original's covered area in pixels, summed over them.
-    pub far_area: f64,
-}
 
 /// What was found.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -59,12 +40,6 @@ impl Matched {
     }
 }
 
-/// One sample a pixel of the base level: errors at edges cancel over a picture and many views.
-const NEAR: Sampling = Sampling {
-    side: 1,
-    mips: Mips::Base,
-};
-
 /// Thresholds beyond these leave no texel out, or none in.
 const THRESHOLDS: [f32; 2] = [-0.6, 1.6];
 
@@ -76,6 +51,16 @@ pub const CONTRAST_GUESS: i32 = 32;
 
 /// Both alphas stay this far from the cutoff of 128: room for rounding in mips.
 const HIGHEST_CONTRAST: f64 = 120.0;
+
+/// A threshold is looked for so far around one half first: those of an oak's levels are .35 to .65.
+const FIRST_RANGE: f32 = 0.25;
+
+/// Later it is looked for so far around the last one, and so much farther for each step that the
+/// contrast has made: on an oak's levels a step moves it by .0026. Beyond that all are looked at again.
+const RANGE: [f32; 2] = [0.02, 0.005];
+
+/// What areas from afar grow by with a step of contrast: on an oak's levels it is .0005 to .0007.
+const AREA_A_STEP: f64 = 5e-4;
 
 /// Sets the alpha of `foliage` from `score` so that cards and `wood` together cover what the
 /// original covers; the search begins at the contrast `guess`.
@@ -93,31 +78,46 @@ pub fn match_area(
     if foliage.charts.is_empty() {
         return found;
     }
-    let mut level = LevelScene::new(foliage, wood);
     for (score, _) in score.iter_mut().zip(&foliage.owned).filter(|(_, o)| !**o) {
         *score = f32::NEG_INFINITY;
     }
+    let [width, height] = foliage.size;
+    let page = ScorePage::new(width, height, score);
+    let mut level = LevelScene::new(foliage, wood);
+    let seen = WoodSeen::new(&level, goal);
     let search = Search {
         range: [-HIGHEST_CONTRAST, HIGHEST_CONTRAST],
         guess: guess.into(),
-        step: 16.0,
+        slope: AREA_A_STEP,
+        step: 48.0,
         grain: 2.0,
         tolerance: FAR_TOLERANCE,
     };
+    let mut before = None;
     search.falling(|contrast| {
         found.contrast = contrast.round() as i32;
-        (found.threshold, found.near_ratio) = level.threshold(&score, found.alphas(), goal);
-        apply(foliage, &score, found);
-        found.own_ratio = level.client_area(foliage, &goal.own) / goal.own_area.max(1e-9);
-        found.far_ratio = level.client_area(foliage, &goal.far) / goal.far_area.max(1e-9);
+        let range = match before.replace(found.contrast) {
+            None => FIRST_RANGE,
+            Some(before) => RANGE[0] + RANGE[1] * found.contrast.abs_diff(before) as f32,
+        };
+        let scores = Scores {
+            page: &page,
+            alphas: found.alphas(),
+            range: [found.threshold - range, found.threshold + range],
+        };
+        (found.threshold, found.near_ratio) = threshold(&level, &seen, scores, goal);
+        apply(foliage, &page, found);
+        level.set_alpha(&foliage.alpha);
+        found.own_ratio = level.client_area(&goal.own, &seen.own) / goal.own_area.max(1e-9);
+        found.far_ratio = level.client_area(&goal.far, &seen.far) / goal.far_area.max(1e-9);
         1.0 - (found.own_ratio + found.far_ratio) / 2.0
     });
     found
 }
 
-fn apply(foliage: &mut Foliage, score: &[f32], found: Matched) {
+fn apply(foliage: &mut Foliage, page: &ScorePage, found: Matched) {
     let [opaque, other] = found.alphas();
-    let texels = foliage.alpha.par_iter_mut().zip(score);
+    let texels = foliage.alpha.par_iter_mut().zip(page.scores());
     texels.for_each(|(alpha, &score)| {
         *alpha = if score >= found.threshold {
             opaque
@@ -130,18 +130,50 @@ fn apply(foliage: &mut Foliage, score: &[f32], found: Matched) {
     });
 }
 
-/// The threshold at which as many pixels are covered as `wanted`, and how many are.
-fn at_count(mut critical: Vec<f32>, wanted: f64) -> (f32, usize) {
-    let [least, most] = THRESHOLDS;
-    critical.par_sort_unstable_by(|a, b| b.total_cmp(a));
-    let covered = |threshold: f32| critical.partition_point(|&c| c >= threshold);
-    let index = (wanted.round() as usize).min(critical.len());
-    let Some(&last) = critical.get(index.saturating_sub(1)) else {
-        return (least, 0);
+/// The threshold at which the area near is the original's, and the area over it; looked for in the
+/// scores' range first.
+fn threshold(level: &LevelScene, seen: &WoodSeen, scores: Scores, goal: &AreaGoal) -> (f32, f64) {
+    let within = |range: [f32; 2]| {
+        let scores = Scores { range, ..scores };
+        let mut pixels = level.critical(&goal.near, &seen.near, scores);
+        at_count(&mut pixels, range, goal.near_area)
     };
+    let all = [f32::NEG_INFINITY, f32::INFINITY];
+    let found = within(scores.range).or_else(|| within(all));
+    let (threshold, covered) = found.unwrap_or((THRESHOLDS[0], 0));
+    (threshold, covered as f64 / goal.near_area.max(1e-9))
+}
+
+/// The threshold at which as many pixels are covered as `wanted`, and how many are; `None` where it
+/// lies beyond `range`, between whose ends `critical` tells thresholds apart.
+fn at_count(critical: &mut Critical, range: [f32; 2], wanted: f64) -> Option<(f32, usize)> {
+    let [least, most] = THRESHOLDS;
+    let known = range[0] > least || range[1] < most;
+    let Critical { above, within } = critical;
+    within.par_sort_unstable_by(|a, b| b.total_cmp(a));
+    let covered = |threshold: f32| *above + within.partition_point(|&c| c >= threshold);
+    let index = (wanted.round() as usize).min(*above + within.len());
+    let Some(&last) = index.checked_sub(*above + 1).and_then(|i| within.get(i)) else {
+        // None are asked for, or all of those above.
+        let none = if *above + within.len() == 0 {
+            least
+        } else {
+            most
+        };
+        return (!known).then_some((none, covered(none)));
+    };
+    if known && index == *above + within.len() {
+        return None;
+    }
     // Many texels may have the same score: with them or without, whichever is nearer.
     let tied = last.clamp(least, most);
-    let next = critical[..covered(tied)].iter().rev().find(|&&c| c > tied);
+    let next = within[..covered(tied) - *above]
+        .iter()
+        .rev()
+        .find(|&&c| c > tied);
+    if known && next.is_none() {
+        return None;
+    }
     let above = next.map_or(most, |c| 0.5 * (tied + c)).clamp(least, most);
     let miss = |threshold: f32| (covered(threshold) as f64 - wanted).abs();
     let best = if miss(above) < miss(tied) {
@@ -149,107 +181,7 @@ fn at_count(mut critical: Vec<f32>, wanted: f64) -> (f32, usize) {
     } else {
         tied
     };
-    (best, covered(best))
-}
-
-/// Cards and wood in one mesh for the raster; only alpha changes between renderings.
-pub struct LevelScene {
-    surface: Surface,
-    materials: Vec<u32>,
-    textures: [Texture; 1],
-}
-
-impl LevelScene {
-    /// Cards first, then the wood.
-    pub fn new(foliage: &Foliage, wood: &[Surface]) -> Self {
-        let mut surface = foliage.surface();
-        let mut materials = vec![0; surface.triangles.len()];
-        for part in wood {
-            let base = surface.positions.len() as u32;
-            surface.positions.extend(&part.positions);
-            surface.uvs[0].resize(surface.positions.len(), glam::Vec2::ZERO);
-            surface
-                .triangles
-                .extend(part.triangles.iter().map(|t| t.map(|i| i + base)));
-            materials.resize(surface.triangles.len(), 1);
-        }
-        let [w, h] = foliage.size;
-        Self {
-            surface,
-            materials,
-            textures: [Texture::from_alpha(w, h, foliage.alpha.clone())],
-        }
-    }
-
-    /// The threshold at which the near area is the original's, and the area over it.
-    fn threshold(&self, score: &[f32], alphas: [u8; 2], goal: &AreaGoal) -> (f32, f64) {
-        let materials = materials();
-        let scene = self.scene(&materials);
-        let draw = |camera: &Camera| critical(&scene, camera, Scores { score, alphas });
-        let pixels: Vec<Vec<f32>> = goal.near.par_iter().map(draw).collect();
-        let (threshold, covered) = at_count(pixels.concat(), goal.near_area);
-        (threshold, covered as f64 / goal.near_area.max(1e-9))
-    }
-
-    /// Covered pixels of each camera, from the base level.
-    pub fn near_areas(&mut self, foliage: &Foliage, cameras: &[Camera]) -> Vec<f64> {
-        self.areas(foliage, cameras, |scene, camera| {
-            coverage(scene, camera, NEAR).area()
-        })
-    }
-
-    /// Covered pixels of all cameras as a client draws them.
-    fn client_area(&mut self, foliage: &Foliage, cameras: &[Camera]) -> f64 {
-        let areas = self.areas(foliage, cameras, |scene, camera| {
-            coverage_multisampled(scene, camera).area()
-        });
-        areas.iter().sum()
-    }
-
-    fn areas(
-        &mut self,
-        foliage: &Foliage,
-        cameras: &[Camera],
-        draw: impl Fn(&Scene, &Camera) -> f64 + Sync,
-    ) -> Vec<f64> {
-        self.textures[0].set_alpha(&foliage.alpha);
-        let materials = materials();
-        let scene = self.scene(&materials);
-        cameras
-            .par_iter()
-            .map(|camera| draw(&scene, camera))
-            .collect()
-    }
-
-    fn scene<'a>(&'a self, materials: &'a [Material]) -> Scene<'a> {
-        Scene {
-            geometry: Geometry {
-                positions: &self.surface.positions,
-                normals: &[],
-                uvs: [&self.surface.uvs[0], &[]],
-                colors: &[],
-                triangles: &self.surface.triangles,
-                triangle_material: &self.materials,
-            },
-            materials,
-            textures: &self.textures,
-        }
-    }
-}
-
-/// Those of cards and of wood. Both have two sides, as they are written: thin twigs are ribbons of
-/// one sheet.
-fn materials() -> [Material; 2] {
-    let wood = Material {
-        double_sided: true,
-        ..Material::default()
-    };
-    let cards = Material {
-        texture: Some(0),
-        cutoff: Some(0.5),
-        ..wood
-    };
-    [cards, wood]
+    Some((best, covered(best)))
 }
 
 #[cfg(test)]
@@ -338,16 +270,45 @@ mod tests {
         assert!((found.near_ratio - 1.0).abs() < 0.05, "{found:?}");
     }
 
+    const ALL: [f32; 2] = [f32::NEG_INFINITY, f32::INFINITY];
+
+    fn counted(above: usize, within: &[f32]) -> Critical {
+        Critical {
+            above,
+            within: within.to_vec(),
+        }
+    }
+
     #[test]
     fn the_threshold_leaves_as_many_pixels_as_wanted() {
-        let critical = vec![0.5, f32::INFINITY, 0.75, 0.25, 0.5, 0.5];
-        assert_eq!(at_count(critical.clone(), 2.0), (0.75, 2));
+        // One pixel is opaque whatever the threshold.
+        let count = |wanted| {
+            let mut critical = counted(1, &[0.5, 0.75, 0.25, 0.5, 0.5]);
+            at_count(&mut critical, ALL, wanted)
+        };
+        assert_eq!(count(2.0), Some((0.75, 2)));
         // Three are tied: five are nearer to four than two are.
-        assert_eq!(at_count(critical.clone(), 4.0), (0.5, 5));
-        assert_eq!(at_count(critical.clone(), 3.0), (0.625, 2));
-        assert_eq!(at_count(critical.clone(), 9.0), (0.25, 6));
-        assert_eq!(at_count(critical.clone(), 0.0), (THRESHOLDS[1], 1));
-        assert_eq!(at_count(Vec::new(), 9.0), (THRESHOLDS[0], 0));
+        assert_eq!(count(4.0), Some((0.5, 5)));
+        assert_eq!(count(3.0), Some((0.625, 2)));
+        assert_eq!(count(9.0), Some((0.25, 6)));
+        assert_eq!(count(0.0), Some((THRESHOLDS[1], 1)));
+        let nothing = at_count(&mut counted(0, &[]), ALL, 9.0);
+        assert_eq!(nothing, Some((THRESHOLDS[0], 0)));
+    }
+
+    #[test]
+    fn a_threshold_within_a_range_is_that_of_all_or_not_known() {
+        let all = [0.9f32, 0.8, 0.62, 0.6, 0.58, 0.56, 0.3, 0.2];
+        let range = [0.5, 0.7];
+        for wanted in 0..9 {
+            let full = at_count(&mut counted(0, &all), ALL, f64::from(wanted));
+            let above = all.iter().filter(|&&c| c >= range[1]).count();
+            let within = all.iter().filter(|&&c| c > range[0] && c < range[1]);
+            let within: Vec<f32> = within.copied().collect();
+            let some = at_count(&mut counted(above, &within), range, f64::from(wanted));
+            assert_eq!(some.is_some(), (4..6).contains(&wanted), "{wanted}");
+            assert!(some.is_none() || some == full, "{some:?} for {full:?}");
+        }
     }
 
     #[test]

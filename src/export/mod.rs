@@ -12,6 +12,7 @@ pub mod gltf;
 pub mod hierarchy;
 pub mod instanced;
 mod leftovers;
+pub mod level_scene;
 pub mod manifest;
 mod manifest_check;
 pub mod manifest_tiles;

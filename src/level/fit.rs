@@ -8,7 +8,8 @@ use crate::error::Result;
 use crate::export::atlas::Layout;
 use crate::export::enough::enough;
 use crate::export::foliage::{self, BakeOptions, Foliage};
-use crate::export::matching::{AreaGoal, CONTRAST_GUESS, LevelScene, Matched, match_area};
+use crate::export::level_scene::{AreaGoal, LevelScene};
+use crate::export::matching::{CONTRAST_GUESS, Matched, match_area};
 use crate::export::original::{Original, camera};
 use crate::export::refine::{Refine, refine};
 use crate::export::surface::{Scene, Surface, scene_of_wood};
@@ -180,13 +181,13 @@ impl Fitted {
     /// The least covered area of all training views, over the original's.
     pub(super) fn least_view(&self, original: &Original) -> f64 {
         let unit = near_height_px(self.request) / original.height;
-        let mut level = LevelScene::new(&self.foliage, &self.wood.surfaces);
+        let level = LevelScene::new(&self.foliage, &self.wood.surfaces);
         let cameras: Vec<Camera> = original
             .directions
             .iter()
             .map(|d| camera(d, unit))
             .collect();
-        let covered = level.near_areas(&self.foliage, &cameras);
+        let covered = level.near_areas(&cameras);
         let wanted = original.areas();
         let wanted = wanted.iter().map(|area| area * f64::from(unit * unit));
         covered

@@ -7,13 +7,18 @@ pub struct Search {
     pub range: [f64; 2],
     /// First value tried.
     pub guess: f64,
-    /// Distance from the guess to the second value tried; it doubles until zero is passed.
+    /// How steeply the function may fall: tells where the second value is tried.
+    pub slope: f64,
+    /// Most distance from the guess to the second value tried; it may double until zero is passed.
     pub step: f64,
     /// The answer is known well enough when it is this certain.
     pub grain: f64,
     /// Values of the function as small as this count as zero.
     pub tolerance: f64,
 }
+
+/// Zero is passed by this much more than a line says, so that it lies between two values.
+const FARTHER: f64 = 1.25;
 
 impl Search {
     /// The crossing of `f`, which must not rise, by the Illinois variant of false position.
@@ -25,11 +30,12 @@ impl Search {
             return first;
         }
         let (mut low, mut high) = ((first, value), (first, value));
-        let mut step = self.step;
+        let (mut step, mut last) = (self.step.min(value.abs() / self.slope), value);
         // Walk towards zero until it is passed.
         while (low.1 > 0.0) == (high.1 > 0.0) {
             let up = value > 0.0;
             let from = if up { high.0 } else { low.0 };
+            step = step.max(self.grain);
             let next = (from + if up { step } else { -step }).clamp(least, most);
             if next == from {
                 return next;
@@ -43,7 +49,10 @@ impl Search {
             } else {
                 ((next, value), low)
             };
-            step *= 2.0;
+            // On along the last two values, and a little farther than to zero; flat ones tell nothing.
+            let fell = (last - value).abs() / step;
+            step = (2.0 * step).min(FARTHER * value.abs() / fell.max(f64::MIN_POSITIVE));
+            last = value;
         }
         self.narrow(low, high, f)
     }
@@ -84,6 +93,7 @@ mod tests {
     const SEARCH: Search = Search {
         range: [-1.0, 3.0],
         guess: 0.5,
+        slope: 2.0,
         step: 0.1,
         grain: 1e-6,
         tolerance: 1e-9,

@@ -1,8 +1,9 @@
 //! Which samples a scene hits: alpha without colour or depth, the fast path.
 
+use super::row::is_all;
 use super::seen::seen;
 use super::triangle::CENTER;
-use super::{Camera, Sampling, Scene};
+use super::{Camera, Mips, Sampling, Scene};
 
 /// For every sample, whether anything hits it.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -39,42 +40,69 @@ pub struct Stats {
 
 /// Draws where the scene is.
 pub fn coverage(scene: &Scene, camera: &Camera, sampling: Sampling) -> Mask {
-    coverage_with_stats(scene, camera, sampling).0
+    let mut mask = Mask::empty(camera, sampling.side);
+    mask.draw(scene, camera, sampling.mips);
+    mask
 }
 
 /// As [`coverage`], with the number of fragments.
 pub fn coverage_with_stats(scene: &Scene, camera: &Camera, sampling: Sampling) -> (Mask, Stats) {
-    let corners = camera.project(scene.geometry.positions, sampling.side);
-    let (width, height) = (
-        (camera.width * sampling.side) as i32,
-        (camera.height * sampling.side) as i32,
-    );
-    let mut samples = vec![0u8; width as usize * height as usize];
-    let mut fragments = 0;
-    for shown in seen(scene, &corners, CENTER) {
-        let mut fragment = None;
-        shown.triangle.scan(width, height, |y, from, to| {
-            fragments += (to - from) as u64;
-            let row = y as usize * width as usize;
-            let row = &mut samples[row + from as usize..row + to as usize];
-            if shown.material.cutoff.is_none() {
-                return row.fill(1);
-            }
-            let fragment = fragment.get_or_insert_with(|| shown.fragment(scene, sampling));
-            fragment.test_row(y, from, row);
-        });
-    }
-    let mask = Mask {
-        width: camera.width,
-        height: camera.height,
-        side: sampling.side,
-        samples,
-    };
+    let mut mask = Mask::empty(camera, sampling.side);
+    let fragments = mask.add::<true>(scene, camera, sampling.mips);
     let covered = mask.samples.iter().map(|&s| s as u64).sum();
     (mask, Stats { fragments, covered })
 }
 
 impl Mask {
+    /// Nothing, with so many samples along a pixel's edge.
+    pub fn empty(camera: &Camera, side: u32) -> Self {
+        let samples = (camera.width * side) as usize * (camera.height * side) as usize;
+        Self {
+            width: camera.width,
+            height: camera.height,
+            side,
+            samples: vec![0; samples],
+        }
+    }
+
+    /// Adds what a scene covers, seen by a camera of the same size.
+    pub fn draw(&mut self, scene: &Scene, camera: &Camera, mips: Mips) {
+        self.add::<false>(scene, camera, mips);
+    }
+
+    /// As [`Mask::draw`]; returns the samples inside triangles that face the eye, if they are counted.
+    fn add<const COUNTED: bool>(&mut self, scene: &Scene, camera: &Camera, mips: Mips) -> u64 {
+        let side = self.side;
+        let sampling = Sampling { side, mips };
+        let corners = camera.project(scene.geometry.positions, side);
+        let (width, height) = ((self.width * side) as i32, (self.height * side) as i32);
+        let samples = &mut self.samples;
+        let mut fragments = 0;
+        for shown in seen(scene, &corners, CENTER) {
+            let mut fragment = None;
+            shown.triangle.rows(width, height, CENTER, |y, row| {
+                let first = y as usize * width as usize;
+                let (from, to) = row.reach();
+                // Inside a crown most samples are hit: edges are not even looked at.
+                if !COUNTED && is_all::<1>(&samples[first + from..first + to]) {
+                    return;
+                }
+                let [(from, to)] = row.spans();
+                if from >= to {
+                    return;
+                }
+                fragments += (to - from) as u64;
+                let row = &mut samples[first + from as usize..first + to as usize];
+                if shown.material.cutoff.is_none() {
+                    return row.fill(1);
+                }
+                let fragment = fragment.get_or_insert_with(|| shown.fragment(scene, sampling));
+                fragment.test_row(y, from, row);
+            });
+        }
+        fragments
+    }
+
     /// Averages the samples of every pixel.
     pub fn coverage(&self) -> Coverage {
         self.coverage_shifted(0, 0)

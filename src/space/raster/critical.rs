@@ -4,75 +4,207 @@
 //! pixel is covered as long as the threshold is at most a certain value: that of the last texel
 //! which its best fragment needs to pass the alpha test. These values, once known, tell the
 //! covered area at any threshold without drawing again.
+//!
+//! Who knows about where the threshold is asks for a range: pixels above it are as good as opaque,
+//! texels below it as good as holes, and most fragments are passed over.
 
+use super::row::TexelRow;
 use super::seen::seen;
+use super::texture::{BLOCK, Level};
 use super::triangle::CENTER;
-use super::{Camera, Mips, Sampling, Scene};
+use super::{Camera, Mask, Mips, Sampling, Scene};
 
-/// Scores of the base level's texels, and what alpha they lead to.
+/// Scores of the base level's texels, with the highest one of each block of them.
+#[derive(Clone, Debug)]
+pub struct ScorePage {
+    score: Vec<f32>,
+    /// Of the block's texels and one more to the right and below: what its samples mix.
+    highest: Vec<f32>,
+    across: usize,
+}
+
+/// What alpha scores lead to, and which thresholds matter.
 #[derive(Clone, Copy, Debug)]
 pub struct Scores<'a> {
-    /// One a texel; minus infinity where alpha is 0 whatever the threshold.
-    pub score: &'a [f32],
+    /// The texels' scores.
+    pub page: &'a ScorePage,
     /// Alpha where the score reaches the threshold, and elsewhere.
     pub alphas: [u8; 2],
+    /// Thresholds between these are told apart.
+    pub range: [f32; 2],
+}
+
+/// The pixels that some threshold covers.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Critical {
+    /// How many are covered at the upper end of the range.
+    pub above: usize,
+    /// For each other one that a threshold within the range covers the highest that does, in no order.
+    pub within: Vec<f32>,
 }
 
 /// Half of the range of alpha in the units of texture filtering: the cutoff of 0.5.
 const CUTOFF: u32 = 255 * 65_536 / 2;
 
-/// For every pixel that anything can cover the highest threshold at which it is covered, in no
-/// order; infinite where opaque triangles do. One sample a pixel of the base level; materials with
-/// a cutoff have one of 0.5 and all use one texture, that of the scores.
-pub fn critical(scene: &Scene, camera: &Camera, scores: Scores) -> Vec<f32> {
-    let sampling = Sampling {
-        side: 1,
-        mips: Mips::Base,
-    };
-    let corners = camera.project(scene.geometry.positions, sampling.side);
+const SAMPLING: Sampling = Sampling {
+    side: 1,
+    mips: Mips::Base,
+};
+
+/// For every pixel that anything can cover the highest threshold at which it is covered, beside what
+/// `covered` covers (the mask of opaque triangles from the same camera, an orthographic one). One
+/// sample a pixel of the base level; materials with a cutoff have one of 0.5 and all use one texture, that of the scores.
+pub fn critical(scene: &Scene, camera: &Camera, covered: &Mask, scores: Scores) -> Critical {
+    let [floor, ceiling] = scores.range;
+    let corners = camera.project(scene.geometry.positions, SAMPLING.side);
     let (width, height) = (camera.width as i32, camera.height as i32);
-    let mut pixels = vec![f32::NEG_INFINITY; width as usize * height as usize];
+    let of_mask = |&hit: &u8| match hit {
+        0 => f32::NEG_INFINITY,
+        _ => f32::INFINITY,
+    };
+    let mut pixels: Vec<f32> = covered.samples.iter().map(of_mask).collect();
+    pixels.resize(width as usize * height as usize, f32::NEG_INFINITY);
     for shown in seen(scene, &corners, CENTER) {
         let mut fragment = None;
-        shown.triangle.scan(width, height, |y, from, to| {
-            let row = y as usize * width as usize;
-            let row = &mut pixels[row + from as usize..row + to as usize];
+        shown.triangle.rows(width, height, CENTER, |y, row| {
+            let first = y as usize * width as usize;
+            let (from, to) = row.reach();
+            // Inside a crown most pixels are settled: edges are not even looked at.
+            if pixels[first + from..first + to]
+                .iter()
+                .all(|&p| p >= ceiling)
+            {
+                return;
+            }
+            let [(from, to)] = row.spans();
+            if from >= to {
+                return;
+            }
+            let row = &mut pixels[first + from as usize..first + to as usize];
             if shown.material.cutoff.is_none() {
                 return row.fill(f32::INFINITY);
             }
-            let fragment = fragment.get_or_insert_with(|| shown.fragment(scene, sampling));
-            for (pixel, x) in row.iter_mut().zip(from..) {
-                if let Some((texels, weights)) = fragment.texels(x, y) {
-                    let found = scores.critical(texels, weights, *pixel);
-                    *pixel = pixel.max(found);
-                }
+            let fragment = fragment.get_or_insert_with(|| shown.fragment(scene, SAMPLING));
+            if let Some(texels) = fragment.base_row(y) {
+                scores.raise(&texels, from, row);
             }
         });
     }
-    pixels.retain(|&p| p > f32::NEG_INFINITY);
-    pixels
+    let above = pixels.iter().filter(|&&p| p >= ceiling).count();
+    pixels.retain(|&p| p > floor && p < ceiling);
+    pixels.shrink_to_fit();
+    Critical {
+        above,
+        within: pixels,
+    }
+}
+
+impl ScorePage {
+    /// One score a texel, rows from the top; minus infinity where alpha is 0 whatever the threshold.
+    pub fn new(width: u32, height: u32, score: Vec<f32>) -> Self {
+        let (width, height) = (width as usize, height as usize);
+        let block = BLOCK as usize;
+        let across = width.div_ceil(block);
+        let mut highest = vec![f32::NEG_INFINITY; across * height.div_ceil(block)];
+        let mut of_row = vec![f32::NEG_INFINITY; across];
+        for (y, row) in score.chunks_exact(width.max(1)).enumerate() {
+            for (x, of_block) in of_row.iter_mut().enumerate() {
+                let end = ((x + 1) * block + 1).min(width);
+                let texels = &row[x * block..end];
+                *of_block = texels.iter().fold(f32::NEG_INFINITY, |m, &s| m.max(s));
+            }
+            // The first row of a block is read together with the block above, too.
+            let above = (y % block == 0)
+                .then(|| (y / block).checked_sub(1))
+                .flatten();
+            for blocks in [Some(y / block), above].into_iter().flatten() {
+                let blocks = &mut highest[blocks * across..][..across];
+                blocks
+                    .iter_mut()
+                    .zip(&of_row)
+                    .for_each(|(h, &s)| *h = h.max(s));
+            }
+        }
+        Self {
+            score,
+            highest,
+            across,
+        }
+    }
+
+    /// The texels' scores, rows from the top.
+    pub fn scores(&self) -> &[f32] {
+        &self.score
+    }
+
+    /// The highest score that a sample may mix which lies in this texel's block.
+    #[inline]
+    fn highest(&self, [x, y]: [i32; 2]) -> f32 {
+        self.highest[(y / BLOCK) as usize * self.across + (x / BLOCK) as usize]
+    }
 }
 
 impl Scores<'_> {
+    /// Raises the pixels of a row to the highest threshold at which these texels cover them.
+    #[inline]
+    fn raise(&self, texels: &TexelRow, from: i32, pixels: &mut [f32]) {
+        let level: &Level = texels.level;
+        let [floor, ceiling] = self.range;
+        let step = texels.step();
+        let mut i = 0;
+        while i < pixels.len() {
+            if pixels[i] >= ceiling {
+                i += 1;
+                continue;
+            }
+            let (texel, part) = texels.place(from + i as i32);
+            if level.holds(texel) {
+                let highest = self.page.highest(texel);
+                if highest <= floor {
+                    i += texels.run(texel, part, step).min(pixels.len() - i);
+                    continue;
+                }
+                if highest <= pixels[i] {
+                    i += 1;
+                    continue;
+                }
+            }
+            let four = level.neighbours(texel, texels.address);
+            let known = pixels[i].max(floor);
+            pixels[i] = pixels[i].max(self.critical(four, weights(part), known));
+            i += 1;
+        }
+    }
+
     /// The highest threshold at which four texels pass the test, if it is above `known`.
+    #[inline]
     fn critical(&self, texels: [usize; 4], weights: [u32; 4], known: f32) -> f32 {
-        let mut four: [(f32, u32); 4] =
-            std::array::from_fn(|i| (self.score[texels[i]], weights[i]));
-        if four.iter().all(|f| f.0 <= known) {
+        let score = &self.page.score;
+        let four: [f32; 4] = texels.map(|t| score[t]);
+        if four.iter().all(|&s| s <= known) {
             return known;
         }
         let [opaque, other] = self.alphas.map(u32::from);
-        four.sort_unstable_by(|a, b| b.0.total_cmp(&a.0));
-        let kept = four.iter().filter(|f| f.0 > f32::NEG_INFINITY);
-        let mut sum: u32 = kept.clone().map(|f| f.1 * other).sum();
-        for (score, weight) in kept {
-            sum += weight * (opaque - other);
-            if sum >= CUTOFF {
-                return *score;
+        let kept = |i: usize| u32::from(four[i] > f32::NEG_INFINITY) * weights[i];
+        let least: u32 = (0..4).map(kept).sum::<u32>() * other;
+        let mut found = known;
+        // Each score in turn is tried as the threshold: four are too few to sort.
+        for &threshold in four.iter().filter(|&&s| s > known) {
+            let passes = |i: usize| u32::from(four[i] >= threshold) * weights[i];
+            let sum = least + (0..4).map(passes).sum::<u32>() * (opaque - other);
+            if sum >= CUTOFF && threshold > found {
+                found = threshold;
             }
         }
-        f32::NEG_INFINITY
+        found
     }
+}
+
+/// Weights of four texels, of 65,536, for a place within the first one in 256ths.
+#[inline]
+fn weights([right, below]: [u32; 2]) -> [u32; 4] {
+    let (left, above) = (256 - right, 256 - below);
+    [left * above, right * above, left * below, right * below]
 }
 
 #[cfg(test)]
@@ -93,6 +225,7 @@ mod tests {
                 false => 0.7 * noise(i / 3) + 0.3 * noise(i),
             })
             .collect();
+        let page = ScorePage::new(size, size, score.clone());
         let corner = |x: f32, y: f32, z: f32| Vec3::new(x, y, z);
         let positions = [
             corner(-1.0, -1.0, 0.0),
@@ -132,17 +265,24 @@ mod tests {
                     materials: &[material],
                     textures: &textures,
                 };
-                let sampling = Sampling {
+                let nothing = Mask {
+                    width: camera.width,
+                    height: camera.height,
                     side: 1,
-                    mips: Mips::Base,
+                    samples: vec![0; 110 * 110],
                 };
-                let scores = Scores {
-                    score: &score,
-                    alphas,
+                let in_range = |range| {
+                    let scores = Scores {
+                        page: &page,
+                        alphas,
+                        range,
+                    };
+                    critical(&scene, &camera, &nothing, scores)
                 };
                 (
-                    coverage(&scene, &camera, sampling).area(),
-                    critical(&scene, &camera, scores),
+                    coverage(&scene, &camera, SAMPLING).area(),
+                    in_range([f32::NEG_INFINITY, f32::INFINITY]).within,
+                    in_range([0.3, 0.7]),
                 )
             };
             let mut seen = Vec::new();
@@ -152,9 +292,14 @@ mod tests {
                     true => alphas[0],
                     false => alphas[1],
                 };
-                let (area, critical) = draw((0..size * size).map(alpha).collect());
-                let counted = critical.iter().filter(|&&c| c >= threshold).count();
+                let (area, critical, some) = draw((0..size * size).map(alpha).collect());
+                let count = |of: &[f32]| of.iter().filter(|&&c| c >= threshold).count();
+                let counted = count(&critical);
                 assert_eq!(area, counted as f64, "{alphas:?} at {threshold}");
+                if (0.3..0.7).contains(&threshold) {
+                    let again = some.above + count(&some.within);
+                    assert_eq!(again, counted, "{alphas:?} at {threshold}");
+                }
                 seen.push(counted);
             }
             assert!(

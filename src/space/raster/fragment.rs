@@ -152,11 +152,16 @@ impl<'a> Fragment<'a> {
         }
     }
 
-    /// The four texels of the base level that a sample mixes, and their weights of 65,536; `None`
-    /// without a texture.
-    pub fn texels(&self, x: i32, y: i32) -> Option<([usize; 4], [u32; 4])> {
-        let texture = self.texture?;
-        Some(texture.texels(self.at(x, y).0, self.address()))
+    /// Where the samples of a row read the base level; `None` without a texture, or where lines of
+    /// sight meet.
+    pub fn base_row(&self, y: i32) -> Option<TexelRow<'a>> {
+        let texture = self.texture.filter(|_| self.is_flat())?;
+        Some(TexelRow {
+            level: texture.base(),
+            u: self.u.row(y),
+            v: self.v.row(y),
+            address: self.address(),
+        })
     }
 
     /// Linear base colour without vertex colours.

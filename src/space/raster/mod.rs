@@ -34,11 +34,11 @@ mod triangle;
 
 pub use camera::{Camera, Placement};
 pub use coverage::{Coverage, Mask, Stats, coverage, coverage_with_stats};
-pub use critical::{Scores, critical};
+pub use critical::{Critical, ScorePage, Scores, critical};
 pub use draw::{EMPTY, Items, draw};
 pub use image::Picture;
 pub use layers::Layers;
-pub use msaa::coverage_multisampled;
+pub use msaa::{Multisampled, coverage_multisampled};
 pub use relief::Relief;
 pub use shade::{Light, linear_from_srgb, srgb_from_linear};
 pub use texture::{Texture, Wrap};

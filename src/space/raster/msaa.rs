@@ -6,6 +6,7 @@
 
 use super::camera::SUBSAMPLES;
 use super::coverage::Coverage;
+use super::row::is_all;
 use super::seen::seen;
 use super::{Camera, Mips, Sampling, Scene};
 
@@ -19,22 +20,57 @@ const SHADING: Sampling = Sampling {
     mips: Mips::Linear,
 };
 
+/// A bit for each sample of a pixel.
+const ALL: u8 = (1 << PLACES.len()) - 1;
+
+/// For every pixel which of its four samples are hit. What does not change is drawn once, and the
+/// rest over copies of it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Multisampled {
+    width: u32,
+    height: u32,
+    /// A bit for each sample, rows of pixels from the top.
+    hits: Vec<u8>,
+}
+
 /// Draws where the scene is, as a client with fourfold multisampling does.
 pub fn coverage_multisampled(scene: &Scene, camera: &Camera) -> Coverage {
-    let corners = camera.project(scene.geometry.positions, SHADING.side);
-    let (width, height) = (camera.width as i32, camera.height as i32);
-    let mut hits = vec![0u8; width as usize * height as usize];
-    let places = PLACES.map(|(x, y)| [x, y].map(|p| p * SUBSAMPLES / 16));
-    for shown in seen(scene, &corners, places) {
-        let mut fragment = None;
-        shown
-            .triangle
-            .scan_places(width, height, places, |y, spans| {
+    let mut pixels = Multisampled::empty(camera);
+    pixels.draw(scene, camera);
+    pixels.coverage()
+}
+
+impl Multisampled {
+    /// A picture of nothing.
+    pub fn empty(camera: &Camera) -> Self {
+        Self {
+            width: camera.width,
+            height: camera.height,
+            hits: vec![0; camera.width as usize * camera.height as usize],
+        }
+    }
+
+    /// Adds what a scene covers, seen by a camera of the same size.
+    pub fn draw(&mut self, scene: &Scene, camera: &Camera) {
+        let corners = camera.project(scene.geometry.positions, SHADING.side);
+        let (width, height) = (self.width as i32, self.height as i32);
+        let hits = &mut self.hits;
+        let places = PLACES.map(|(x, y)| [x, y].map(|p| p * SUBSAMPLES / 16));
+        for shown in seen(scene, &corners, places) {
+            let mut fragment = None;
+            shown.triangle.rows(width, height, places, |y, row| {
+                let first = (y * width) as usize;
+                let (from, to) = row.reach();
+                // Inside a crown most pixels are full: edges are not even looked at.
+                if is_all::<ALL>(&hits[first + from..first + to]) {
+                    return;
+                }
+                let spans = row.spans();
                 let inside = |s: &&(i32, i32)| s.0 < s.1;
                 let from = spans.iter().filter(inside).map(|s| s.0).min().unwrap_or(0);
                 let to = spans.iter().filter(inside).map(|s| s.1).max().unwrap_or(0);
-                for x in from..to {
-                    let hit = &mut hits[(y * width + x) as usize];
+                let row = &mut hits[first + from as usize..first + to as usize];
+                for (hit, x) in row.iter_mut().zip(from..).filter(|(hit, _)| **hit != ALL) {
                     let mut here = 0u8;
                     for (bit, span) in spans.iter().enumerate() {
                         here |= u8::from(span.0 <= x && x < span.1) << bit;
@@ -50,10 +86,22 @@ pub fn coverage_multisampled(scene: &Scene, camera: &Camera) -> Coverage {
                     }
                 }
             });
+        }
     }
-    Coverage {
-        width: camera.width,
-        height: camera.height,
-        fraction: hits.iter().map(|h| h.count_ones() as f32 / 4.0).collect(),
+
+    /// Covered area in pixels.
+    pub fn area(&self) -> f64 {
+        let hit: u64 = self.hits.iter().map(|h| u64::from(h.count_ones())).sum();
+        hit as f64 / PLACES.len() as f64
+    }
+
+    /// For every pixel the share of its samples that are hit.
+    pub fn coverage(&self) -> Coverage {
+        let share = |h: &u8| h.count_ones() as f32 / PLACES.len() as f32;
+        Coverage {
+            width: self.width,
+            height: self.height,
+            fraction: self.hits.iter().map(share).collect(),
+        }
     }
 }

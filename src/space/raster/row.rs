@@ -14,6 +14,13 @@ pub(super) struct TexelRow<'a> {
     pub address: Address,
 }
 
+/// Whether all samples have this value.
+#[inline]
+pub(super) fn is_all<const VALUE: u8>(samples: &[u8]) -> bool {
+    let (words, rest) = samples.as_chunks::<8>();
+    words.iter().all(|&word| word == [VALUE; 8]) && rest.iter().all(|&s| s == VALUE)
+}
+
 /// How many samples from the first one on are known to be hit: inside a crown most are, and eight
 /// are passed over at a time.
 #[inline]
@@ -28,23 +35,35 @@ fn hit_from(samples: &[u8]) -> usize {
 const SLACK: f32 = 0.05;
 
 impl TexelRow<'_> {
+    /// Texels from a sample to the next, along both axes.
+    #[inline]
+    pub fn step(&self) -> [f32; 2] {
+        [
+            self.u.dx * self.level.width as f32,
+            self.v.dx * self.level.height as f32,
+        ]
+    }
+
+    /// Where a sample lies; see [`Level::place`].
+    #[inline]
+    pub fn place(&self, x: i32) -> ([i32; 2], [u32; 2]) {
+        self.level
+            .place([self.u.value(x), self.v.value(x)], self.address)
+    }
+
     /// Sets the samples from `from` on that are not hit yet and whose alpha (in the units of
     /// [`Level::mixed`]) passes.
     #[inline]
     pub fn test(&self, from: i32, samples: &mut [u8], passes: impl Fn(f32) -> bool) {
         let level = self.level;
-        let step = [
-            self.u.dx * level.width as f32,
-            self.v.dx * level.height as f32,
-        ];
+        let step = self.step();
         let mut i = 0;
         while i < samples.len() {
             if samples[i] != 0 {
                 i += hit_from(&samples[i..]);
                 continue;
             }
-            let x = from + i as i32;
-            let (texel, part) = level.place([self.u.value(x), self.v.value(x)], self.address);
+            let (texel, part) = self.place(from + i as i32);
             match level.block(texel) {
                 Some(alpha) => {
                     let run = self.run(texel, part, step).min(samples.len() - i);
@@ -63,7 +82,7 @@ impl TexelRow<'_> {
 
     /// How many samples from here on lie in the same block, this one included.
     #[inline]
-    fn run(&self, texel: [i32; 2], part: [u32; 2], step: [f32; 2]) -> usize {
+    pub fn run(&self, texel: [i32; 2], part: [u32; 2], step: [f32; 2]) -> usize {
         let fast = |step: f32| step.abs() > 2.0;
         if !self.address.linear || fast(step[0]) || fast(step[1]) {
             return 1;

@@ -4,7 +4,8 @@
 //! (decoded from sRGB, not weighted by alpha), alpha as it is. Alpha lies in planes of its own, so
 //! that it can be replaced and drawn without touching colours.
 
-use super::blocks::{BLOCK, Blocks};
+pub(super) use super::blocks::BLOCK;
+use super::blocks::Blocks;
 use super::mips;
 
 /// A sampler's wrap mode.
@@ -100,13 +101,9 @@ impl Texture {
         (level.width, level.height, &level.alpha)
     }
 
-    /// The four texels of the base level around `uv`, and their weights of 65,536.
-    pub(super) fn texels(&self, uv: [f32; 2], address: Address) -> ([usize; 4], [u32; 4]) {
-        let base = &self.levels[0];
-        let (texel, [right, below]) = base.place(uv, address);
-        let (left, above) = (256 - right, 256 - below);
-        let weights = [left * above, right * above, left * below, right * below];
-        (base.neighbours(texel, address), weights)
+    /// The base level.
+    pub(super) fn base(&self) -> &Level {
+        &self.levels[0]
     }
 
     /// The levels that a level of detail lies between, 0 being the base.
@@ -207,13 +204,13 @@ impl Level {
 
     /// Whether a texel and its neighbours to the right and below are all inside.
     #[inline]
-    fn holds(&self, [x, y]: [i32; 2]) -> bool {
+    pub fn holds(&self, [x, y]: [i32; 2]) -> bool {
         x >= 0 && y >= 0 && x + 1 < self.width as i32 && y + 1 < self.height as i32
     }
 
     /// A texel and its neighbours: left above, right above, left below, right below.
     #[inline]
-    fn neighbours(&self, [x, y]: [i32; 2], address: Address) -> [usize; 4] {
+    pub fn neighbours(&self, [x, y]: [i32; 2], address: Address) -> [usize; 4] {
         let width = self.width as usize;
         // Nearly every sample lies inside the image, and divisions are dear.
         if self.holds([x, y]) {

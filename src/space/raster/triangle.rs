@@ -87,7 +87,7 @@ impl Triangle {
     }
 
     /// Whether any sample may be inside: most triangles of a far tree lie between all samples, and
-    /// this is all that they cost. `places` are those of [`Triangle::scan_places`].
+    /// this is all that they cost. `places` are those of [`Triangle::rows`].
     pub fn may_hit<const N: usize>(corners: &[Corner; 3], places: [[i32; 2]; N]) -> bool {
         let [a, b, c] = corners;
         let (x0, x1) = (a.x.min(b.x).min(c.x), a.x.max(b.x).max(c.x));
@@ -126,22 +126,23 @@ impl Triangle {
 
     /// Calls `span(y, from, to)` for every row with samples `from..to` inside.
     pub fn scan(&self, width: i32, height: i32, mut span: impl FnMut(i32, i32, i32)) {
-        self.scan_places(width, height, CENTER, |y, [(from, to)]| {
+        self.rows(width, height, CENTER, |y, row| {
+            let [(from, to)] = row.spans();
             if from < to {
                 span(y, from, to);
             }
         });
     }
 
-    /// As [`Triangle::scan`] with samples at several `places` of each pixel, in sub-samples from
-    /// its left upper corner: `row(y, spans)` gets for each place the pixels `from..to` whose
-    /// sample there is inside; equal ends: none.
-    pub fn scan_places<const N: usize>(
+    /// Calls `row(y, ..)` for every row that the triangle may reach, with samples at several `places`
+    /// of each pixel, in sub-samples from its left upper corner. Who needs nothing of a row does not ask
+    /// for its spans, and saves most of what it costs.
+    pub fn rows<const N: usize>(
         &self,
         width: i32,
         height: i32,
         places: [[i32; 2]; N],
-        mut row: impl FnMut(i32, [(i32, i32); N]),
+        mut row: impl FnMut(i32, &mut Spans<N>),
     ) {
         let [a, b, c] = &self.corners;
         let ends = |axis: usize, values: [i32; 3], size: i32| {
@@ -159,25 +160,69 @@ impl Triangle {
         if x0 > x1 || y0 > y1 {
             return;
         }
-        let origin = [x0 * SUBSAMPLES, y0 * SUBSAMPLES];
-        let mut all = places.map(|[px, py]| {
-            let at = [origin[0] + px, origin[1] + py];
-            [(a, b), (b, c), (c, a)].map(|(from, to)| Edge::new(from, to, at))
-        });
+        let mut spans = Spans {
+            triangle: self,
+            x: [x0, x1],
+            y: [y0, y0],
+            places,
+            edges: None,
+        };
         for y in y0..=y1 {
-            let spans = std::array::from_fn(|i| {
-                let (from, to) = if x1 - x0 < SHORT_ROW {
-                    step_row(&all[i], x1 - x0)
-                } else {
-                    solve_row(&all[i], x1 - x0)
-                };
-                (x0 + from, x0 + to)
-            });
-            row(y, spans);
-            for edge in all.iter_mut().flatten() {
-                edge.value += edge.down;
-            }
+            spans.y[1] = y;
+            row(y, &mut spans);
         }
+    }
+}
+
+/// A row of a triangle with `N` samples a pixel.
+pub(super) struct Spans<'t, const N: usize> {
+    triangle: &'t Triangle,
+    /// First and last pixel that may be inside.
+    x: [i32; 2],
+    /// The triangle's first row, and this one.
+    y: [i32; 2],
+    places: [[i32; 2]; N],
+    /// At the first pixel of the first row; made on first use.
+    edges: Option<[[Edge; 3]; N]>,
+}
+
+impl<const N: usize> Spans<'_, N> {
+    /// The pixels `from..to` outside of which nothing is inside.
+    #[inline]
+    pub fn reach(&self) -> (usize, usize) {
+        (self.x[0] as usize, self.x[1] as usize + 1)
+    }
+
+    /// For each place the pixels `from..to` whose sample there is inside; equal ends: none.
+    #[inline]
+    pub fn spans(&mut self) -> [(i32, i32); N] {
+        let ([x0, x1], [y0, y]) = (self.x, self.y);
+        let (triangle, places) = (self.triangle, self.places);
+        let edges = self
+            .edges
+            .get_or_insert_with(|| triangle.edges([x0, y0].map(|o| o * SUBSAMPLES), places));
+        let below = (y - y0) as i64;
+        std::array::from_fn(|i| {
+            let edges = edges[i].map(|edge| Edge {
+                value: edge.value + below * edge.down,
+                ..edge
+            });
+            let (from, to) = if x1 - x0 < SHORT_ROW {
+                step_row(&edges, x1 - x0)
+            } else {
+                solve_row(&edges, x1 - x0)
+            };
+            (x0 + from, x0 + to)
+        })
+    }
+}
+
+impl Triangle {
+    /// The edges at each place of a pixel.
+    fn edges<const N: usize>(&self, [x, y]: [i32; 2], places: [[i32; 2]; N]) -> [[Edge; 3]; N] {
+        let [a, b, c] = &self.corners;
+        let at_corner = [(a, b), (b, c), (c, a)].map(|(from, to)| Edge::new(from, to, [x, y]));
+        places.map(|[px, py]| at_corner.map(|edge| edge.moved(px, py)))
     }
 }
 
@@ -217,6 +262,15 @@ impl Edge {
             right,
             down: dx * grain,
             per_right: 1.0 / right.abs() as f64,
+        }
+    }
+
+    /// The same edge at a place so many sub-samples to the right and below.
+    fn moved(self, x: i32, y: i32) -> Self {
+        let grain = SUBSAMPLES as i64;
+        Self {
+            value: self.value + (self.down / grain) * y as i64 + (self.right / grain) * x as i64,
+            ..self
         }
     }
 

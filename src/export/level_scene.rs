@@ -1,0 +1,172 @@
+//! A level as the raster draws it, to try many alphas: the wood is drawn once, cards over it.
+
+use rayon::prelude::*;
+
+use super::foliage::Foliage;
+use super::surface::Surface;
+use crate::space::raster::{
+    Camera, Critical, Geometry, Mask, Material, Mips, Multisampled, Sampling, Scene, Scores,
+    Texture, coverage, critical,
+};
+
+/// What the level should cover.
+#[derive(Clone, Debug)]
+pub struct AreaGoal {
+    /// Cameras that see the base level of the atlas.
+    pub near: Vec<Camera>,
+    /// The original's covered area in pixels, summed over the near cameras.
+    pub near_area: f64,
+    /// Cameras where the level starts.
+    pub own: Vec<Camera>,
+    /// The original's covered area in pixels, summed over them.
+    pub own_area: f64,
+    /// Cameras at twice that distance.
+    pub far: Vec<Camera>,
+    /// The original's covered area in pixels, summed over them.
+    pub far_area: f64,
+}
+
+/// One sample a pixel of the base level: errors at edges cancel over a picture and many views.
+const NEAR: Sampling = Sampling {
+    side: 1,
+    mips: Mips::Base,
+};
+
+/// Cards and wood as meshes for the raster; only the alpha of cards changes between renderings.
+pub struct LevelScene {
+    cards: Part,
+    wood: Part,
+}
+
+/// What is drawn with one material.
+struct Part {
+    surface: Surface,
+    materials: [Material; 1],
+    /// The cards' alpha; none for wood.
+    textures: Vec<Texture>,
+}
+
+impl Part {
+    fn scene(&self) -> Scene<'_> {
+        Scene {
+            geometry: Geometry {
+                positions: &self.surface.positions,
+                normals: &[],
+                uvs: [&self.surface.uvs[0], &[]],
+                colors: &[],
+                triangles: &self.surface.triangles,
+                triangle_material: &[],
+            },
+            materials: &self.materials,
+            textures: &self.textures,
+        }
+    }
+}
+
+/// What the wood covers, drawn once for all alphas that are tried.
+pub struct WoodSeen {
+    /// From the near cameras, one sample a pixel.
+    pub near: Vec<Mask>,
+    /// Where the level starts, as a client draws it.
+    pub own: Vec<Multisampled>,
+    /// At twice the distance, likewise.
+    pub far: Vec<Multisampled>,
+}
+
+impl WoodSeen {
+    /// Draws the wood for all cameras of a goal.
+    pub fn new(level: &LevelScene, goal: &AreaGoal) -> Self {
+        let wood = level.wood.scene();
+        let client = |cameras: &[Camera]| {
+            let draw = |camera: &Camera| {
+                let mut pixels = Multisampled::empty(camera);
+                pixels.draw(&wood, camera);
+                pixels
+            };
+            cameras.par_iter().map(draw).collect()
+        };
+        let near = goal.near.par_iter();
+        Self {
+            near: near.map(|camera| coverage(&wood, camera, NEAR)).collect(),
+            own: client(&goal.own),
+            far: client(&goal.far),
+        }
+    }
+}
+
+impl LevelScene {
+    /// The cards of `foliage` with its alpha, and the wood.
+    pub fn new(foliage: &Foliage, wood: &[Surface]) -> Self {
+        let mut tubes = Surface::default();
+        for part in wood {
+            let base = tubes.positions.len() as u32;
+            tubes.positions.extend(&part.positions);
+            tubes
+                .triangles
+                .extend(part.triangles.iter().map(|t| t.map(|i| i + base)));
+        }
+        let [w, h] = foliage.size;
+        // Both have two sides, as they are written: thin twigs are ribbons of one sheet.
+        let opaque = Material {
+            double_sided: true,
+            ..Material::default()
+        };
+        let cut = Material {
+            texture: Some(0),
+            cutoff: Some(0.5),
+            ..opaque
+        };
+        Self {
+            cards: Part {
+                surface: foliage.surface(),
+                materials: [cut],
+                textures: vec![Texture::from_alpha(w, h, foliage.alpha.clone())],
+            },
+            wood: Part {
+                surface: tubes,
+                materials: [opaque],
+                textures: Vec::new(),
+            },
+        }
+    }
+
+    /// Replaces the cards' alpha.
+    pub fn set_alpha(&mut self, alpha: &[u8]) {
+        let textures = &mut self.cards.textures;
+        textures.iter_mut().for_each(|t| t.set_alpha(alpha));
+    }
+
+    /// Thresholds of the pixels near, beside the wood there.
+    pub fn critical(&self, cameras: &[Camera], wood: &[Mask], scores: Scores) -> Critical {
+        let scene = self.cards.scene();
+        let draw = |(camera, wood)| critical(&scene, camera, wood, scores);
+        let views: Vec<Critical> = cameras.par_iter().zip(wood).map(draw).collect();
+        Critical {
+            above: views.iter().map(|view| view.above).sum(),
+            within: views.into_iter().flat_map(|view| view.within).collect(),
+        }
+    }
+
+    /// Covered pixels of each camera, from the base level.
+    pub fn near_areas(&self, cameras: &[Camera]) -> Vec<f64> {
+        let (cards, wood) = (self.cards.scene(), self.wood.scene());
+        let area = |camera: &Camera| {
+            let mut mask = coverage(&wood, camera, NEAR);
+            mask.draw(&cards, camera, Mips::Base);
+            mask.area()
+        };
+        cameras.par_iter().map(area).collect()
+    }
+
+    /// Covered pixels of all cameras as a client draws them, over the wood that each sees.
+    pub fn client_area(&self, cameras: &[Camera], wood: &[Multisampled]) -> f64 {
+        let cards = self.cards.scene();
+        let draw = |(camera, wood): (&Camera, &Multisampled)| {
+            let mut pixels = wood.clone();
+            pixels.draw(&cards, camera);
+            pixels.area()
+        };
+        let areas: Vec<f64> = cameras.par_iter().zip(wood).map(draw).collect();
+        areas.iter().sum()
+    }
+}
