@@ -11,6 +11,8 @@
 //! The mean vote is added to the projected coverage and thresholded; a few rounds let cards
 //! agree. Views are orthographic, so a card's texels map to cells by one affine map a view.
 
+use std::sync::LazyLock;
+
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
@@ -44,6 +46,9 @@ pub struct Refine {
     pub weight: f32,
 }
 
+/// Charts that vote at a time: votes take several times the memory of what comes of them.
+const BATCH: usize = 512;
+
 /// For each texel of the page, the projected coverage corrected by the views' votes.
 pub fn refine(foliage: &Foliage, targets: &[Target], options: Refine) -> Vec<f32> {
     let mut score: Vec<f32> = foliage.texels.iter().map(Stored::coverage).collect();
@@ -53,34 +58,15 @@ pub fn refine(foliage: &Foliage, targets: &[Target], options: Refine) -> Vec<f32
     let several = |c: &Chart| matches!(c.shape, Shape::Window | Shape::Mask(_));
     let overlap = foliage.charts.iter().any(several);
     for round in 0..options.rounds {
-        let on: Vec<bool> = score.iter().map(|&s| s >= 0.5).collect();
+        let on = Shown::new(foliage, &rows, |at| score[at] >= 0.5);
         // Views take turns, a third of them a round where there are rounds for all: a third of the
         // work, and on three trees no F1 fell by more than .004.
         let turns = options.rounds.min(3) as usize;
         let turn = round as usize % turns;
         let asked: Vec<&Target> = targets.iter().skip(turn).step_by(turns).collect();
-        let counts: Vec<Vec<u8>> = asked
+        let opinions: Vec<Vec<u8>> = asked
             .par_iter()
-            .map(|target| count(foliage, &rows, target, &on))
-            .collect();
-        let opinions: Vec<Vec<[f32; 2]>> = asked
-            .par_iter()
-            .zip(counts)
-            .map(|(target, counts)| opinions(target, &counts))
-            .collect();
-        let votes: Vec<Vec<Votes>> = foliage
-            .charts
-            .par_iter()
-            .zip(&rows)
-            .map(|(chart, rows)| {
-                vote(
-                    (chart, rows.as_slice()),
-                    foliage.size[0],
-                    &asked,
-                    &opinions,
-                    &on,
-                )
-            })
+            .map(|target| opinions(target, on.count(target)))
             .collect();
         // Later rounds move less, so that two cards do not swap a cell for ever.
         let step = 1.0 / (round as f32 + 1.0).sqrt();
@@ -89,12 +75,16 @@ pub fn refine(foliage: &Foliage, targets: &[Target], options: Refine) -> Vec<f32
             score[at] = foliage.texels[at].coverage() + options.weight * mean[at];
         };
         if overlap {
-            let sums = of_page(foliage, &rows, &votes);
+            let mut sums: Vec<Votes> = vec![(0.0, 0); foliage.texels.len()];
+            on.each_vote(&asked, &opinions, |at, (sum, hits)| {
+                sums[at].0 += sum;
+                sums[at].1 += hits;
+            });
             let owned = (0..sums.len()).filter(|&at| foliage.owned[at]);
             owned.for_each(|at| settle(at, sums[at]));
         } else {
             // Every texel has its votes from one card: no second page of them.
-            each_vote(foliage, &rows, &votes, settle);
+            on.each_vote(&asked, &opinions, settle);
         }
     }
     follow_neighbours(&mut score, foliage);
@@ -104,29 +94,72 @@ pub fn refine(foliage: &Foliage, targets: &[Target], options: Refine) -> Vec<f32
 /// Sum of a texel's votes, and how many there are.
 type Votes = (f32, u32);
 
-/// The votes of all cards that show a texel.
-fn of_page(foliage: &Foliage, rows: &[Vec<u32>], votes: &[Vec<Votes>]) -> Vec<Votes> {
-    let mut sums: Vec<Votes> = vec![(0.0, 0); foliage.texels.len()];
-    each_vote(foliage, rows, votes, |at, (sum, hits)| {
-        sums[at].0 += sum;
-        sums[at].1 += hits;
-    });
-    sums
+/// The page's texels as its cards show them, some opaque.
+struct Shown<'f> {
+    foliage: &'f Foliage,
+    /// Of each chart its [`Chart::row_lengths`].
+    rows: &'f [Vec<u32>],
+    /// Whether each texel of a chart is opaque, in the chart's own order.
+    on: Vec<Vec<bool>>,
 }
 
-/// Visits what each card votes on each of the page's texels that it shows.
-fn each_vote(
-    foliage: &Foliage,
-    rows: &[Vec<u32>],
-    votes: &[Vec<Votes>],
-    mut visit: impl FnMut(usize, Votes),
-) {
-    for ((chart, rows), votes) in foliage.charts.iter().zip(rows).zip(votes) {
-        for (y, &length) in (0..).zip(rows) {
-            for x in 0..length {
+impl<'f> Shown<'f> {
+    /// `opaque` tells it of each texel of the page.
+    fn new(
+        foliage: &'f Foliage,
+        rows: &'f [Vec<u32>],
+        opaque: impl Fn(usize) -> bool + Sync,
+    ) -> Self {
+        let width = foliage.size[0];
+        let of_chart = |chart: &Chart| {
+            let [w, h] = chart.size;
+            let texels = (0..h).flat_map(|y| (0..w).map(move |x| [x, y]));
+            let opaque = |[x, y]: [u32; 2]| {
                 let [ax, ay] = chart.in_atlas(x, y);
-                let at = (ay * foliage.size[0] + ax) as usize;
-                visit(at, votes[(y * chart.size[0] + x) as usize]);
+                opaque((ay * width + ax) as usize)
+            };
+            texels.map(opaque).collect()
+        };
+        Self {
+            on: foliage.charts.par_iter().map(of_chart).collect(),
+            foliage,
+            rows,
+        }
+    }
+
+    /// How many opaque texels each cell sees, at most 255.
+    fn count(&self, target: &Target) -> Vec<u8> {
+        let mut counts = vec![0u8; target.wanted.len()];
+        for ((chart, rows), on) in self.foliage.charts.iter().zip(self.rows).zip(&self.on) {
+            scan(chart, rows, target, |cell, texel| {
+                counts[cell] = counts[cell].saturating_add(u8::from(on[texel]));
+            });
+        }
+        counts
+    }
+
+    /// Visits what each card votes on each of the page's texels that it shows.
+    fn each_vote(
+        &self,
+        targets: &[&Target],
+        opinions: &[Vec<u8>],
+        mut visit: impl FnMut(usize, Votes),
+    ) {
+        let charts = &self.foliage.charts;
+        for first in (0..charts.len()).step_by(BATCH) {
+            let some = first..(first + BATCH).min(charts.len());
+            let of_chart =
+                |i: usize| vote((&charts[i], &self.rows[i]), targets, opinions, &self.on[i]);
+            let votes: Vec<Vec<Votes>> = some.clone().into_par_iter().map(of_chart).collect();
+            for (i, votes) in some.zip(votes) {
+                let chart = &charts[i];
+                for (y, &length) in (0..).zip(&self.rows[i]) {
+                    for x in 0..length {
+                        let [ax, ay] = chart.in_atlas(x, y);
+                        let at = (ay * self.foliage.size[0] + ax) as usize;
+                        visit(at, votes[(y * chart.size[0] + x) as usize]);
+                    }
+                }
             }
         }
     }
@@ -162,10 +195,10 @@ fn follow_neighbours(score: &mut [f32], foliage: &Foliage) {
 /// F1 of the cards and of what is there beside them against the original, mean over the views; a
 /// texel is opaque from half on.
 pub fn f1(foliage: &Foliage, targets: &[Target]) -> f64 {
-    let on: Vec<bool> = foliage.alpha.iter().map(|&a| a >= 128).collect();
     let rows: Vec<Vec<u32>> = foliage.charts.iter().map(Chart::row_lengths).collect();
+    let on = Shown::new(foliage, &rows, |at| foliage.alpha[at] >= 128);
     let of_view = |target: &Target| {
-        let counts = count(foliage, &rows, target, &on);
+        let counts = on.count(target);
         let cells = target.wanted.iter().zip(&target.taken).zip(counts);
         let (mut both, mut any) = (0u64, 0u64);
         for ((&wanted, &taken), count) in cells {
@@ -179,66 +212,59 @@ pub fn f1(foliage: &Foliage, targets: &[Target]) -> f64 {
     views.iter().sum::<f64>() / views.len().max(1) as f64
 }
 
-/// How many opaque texels each cell sees, at most 255.
-fn count(foliage: &Foliage, rows: &[Vec<u32>], target: &Target, on: &[bool]) -> Vec<u8> {
-    let mut counts = vec![0u8; target.wanted.len()];
-    for (chart, rows) in foliage.charts.iter().zip(rows) {
-        scan(chart, rows, target, |cell, x, y| {
-            let [ax, ay] = chart.in_atlas(x, y);
-            if on[(ay * foliage.size[0] + ax) as usize] {
-                counts[cell] = counts[cell].saturating_add(1);
-            }
-        });
+/// Opinions of more overlapping cards than this are alike.
+const MOST: u8 = 250;
+
+/// What a cell says to a texel: nothing, whatever the texel is.
+const SILENT: u8 = 2;
+
+/// Of each number that [`opinions`] gives, what a cell says to a texel that is transparent, and to one
+/// that is opaque there and so one of those that were counted.
+static SAID: LazyLock<[[f32; 2]; 256]> = LazyLock::new(|| {
+    let wanted = |others: u8| f32::from(u8::from(others == 0));
+    let unwanted = |others: u8| -1.0 / (f32::from(others) + 1.0);
+    let both = |count: u8| [count, count.saturating_sub(1)];
+    std::array::from_fn(|number| match number as u8 {
+        count @ 0..=SILENT => both(count).map(wanted),
+        number => both(number - SILENT - 1).map(unwanted),
+    })
+});
+
+/// For every cell a number that says, by [`SAID`], what it says to texels: how many cover it, up to
+/// two where that is wanted, and three more where it is not.
+fn opinions(target: &Target, mut counts: Vec<u8>) -> Vec<u8> {
+    let cells = target.wanted.iter().zip(&target.taken).zip(&mut counts);
+    for ((&wanted, &taken), count) in cells {
+        *count = match (taken, wanted) {
+            (true, _) => SILENT,
+            (false, true) => (*count).min(SILENT),
+            (false, false) => (*count).min(MOST) + SILENT + 1,
+        };
     }
     counts
 }
 
-/// For every cell what it says to a texel that is transparent, and to one that is opaque there:
-/// pairs, since the latter is one of those that were counted.
-fn opinions(target: &Target, counts: &[u8]) -> Vec<[f32; 2]> {
-    let opinion = |wanted: bool, others: u8| match wanted {
-        true => f32::from(u8::from(others == 0)),
-        false => -1.0 / (f32::from(others) + 1.0),
-    };
-    let cells = target.wanted.iter().zip(&target.taken).zip(counts);
-    cells
-        .map(|((&wanted, &taken), &count)| match taken {
-            true => [0.0; 2],
-            false => [count, count.saturating_sub(1)].map(|others| opinion(wanted, others)),
-        })
-        .collect()
-}
-
 fn vote(
     (chart, rows): (&Chart, &[u32]),
-    width: u32,
     targets: &[&Target],
-    opinions: &[Vec<[f32; 2]>],
+    opinions: &[Vec<u8>],
     on: &[bool],
 ) -> Vec<Votes> {
-    let texels = (chart.size[0] * chart.size[1]) as usize;
-    let mut sums = vec![(0.0f32, 0u32); texels];
-    let mut own = vec![false; texels];
-    for y in 0..chart.size[1] {
-        for x in 0..chart.size[0] {
-            let [ax, ay] = chart.in_atlas(x, y);
-            own[(y * chart.size[0] + x) as usize] = on[(ay * width + ax) as usize];
-        }
-    }
+    let mut sums = vec![(0.0f32, 0u32); on.len()];
+    let said = &*SAID;
     for (target, opinions) in targets.iter().zip(opinions) {
-        scan(chart, rows, target, |cell, x, y| {
-            let at = (y * chart.size[0] + x) as usize;
-            let (sum, hits) = &mut sums[at];
-            *sum += opinions[cell][usize::from(own[at])];
+        scan(chart, rows, target, |cell, texel| {
+            let (sum, hits) = &mut sums[texel];
+            *sum += said[usize::from(opinions[cell])][usize::from(on[texel])];
             *hits += 1;
         });
     }
     sums
 }
 
-/// Visits every cell whose centre the card covers, with the texel that lies there; `rows` are the
-/// chart's [`Chart::row_lengths`].
-fn scan(chart: &Chart, rows: &[u32], target: &Target, mut visit: impl FnMut(usize, u32, u32)) {
+/// Visits every cell whose centre the card covers, with the chart's texel that lies there; `rows` are
+/// the chart's [`Chart::row_lengths`].
+fn scan(chart: &Chart, rows: &[u32], target: &Target, mut visit: impl FnMut(usize, usize)) {
     let cell = |p: Vec3| target.base + Vec2::new(p.dot(target.right), p.dot(target.down));
     let corner: Vec<Vec2> = chart.corners.iter().map(|&p| cell(p)).collect();
     let texel: Vec<Vec2> = chart.corners[..3].iter().map(|&p| chart.texel(p)).collect();
@@ -271,9 +297,11 @@ fn scan(chart: &Chart, rows: &[u32], target: &Target, mut visit: impl FnMut(usiz
             + per_x * (x_first as f32 + 0.5 - corner[0].x)
             + per_y * (middle - corner[0].y);
         for x in x_first..x_last {
-            let (tx, ty) = (at.x.max(0.0) as u32, at.y.max(0.0) as u32);
+            // Negative numbers become 0.
+            let (tx, ty) = (at.x as u32, at.y as u32);
             if rows.get(ty as usize).is_some_and(|&length| tx < length) {
-                visit((y * target.size[0] + x) as usize, tx, ty);
+                let texel = (ty * chart.size[0] + tx) as usize;
+                visit((y * target.size[0] + x) as usize, texel);
             }
             at += per_x;
         }
@@ -283,6 +311,27 @@ fn scan(chart: &Chart, rows: &[u32], target: &Target, mut visit: impl FnMut(usiz
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn cells_ask_for_what_is_missing_and_against_what_is_too_much() {
+        let target = Target {
+            right: Vec3::X,
+            down: Vec3::NEG_Y,
+            base: Vec2::ZERO,
+            size: [6, 1],
+            wanted: vec![true, true, true, false, false, true],
+            taken: vec![false, false, false, false, false, true],
+        };
+        let numbers = opinions(&target, vec![0, 1, 4, 0, 2, 0]);
+        let said: Vec<[f32; 2]> = numbers.iter().map(|&n| SAID[usize::from(n)]).collect();
+        // What is wanted: to the only one that may cover it; what is not: less, the more others do.
+        assert_eq!(said[0], [1.0, 1.0]);
+        assert_eq!(said[1], [0.0, 1.0]);
+        assert_eq!(said[2], [0.0, 0.0]);
+        assert_eq!(said[3], [-1.0, -1.0]);
+        assert_eq!(said[4], [-1.0 / 3.0, -0.5]);
+        assert_eq!(said[5], [0.0, 0.0]);
+    }
 
     #[test]
     fn f1_is_twice_the_common_cells_over_both_areas() {
