@@ -13,7 +13,6 @@ use super::surface::Surface;
 use super::texel::Stored;
 use crate::botany::model::{AlphaMode, Image, Material, Model, TextureRef, Wrap};
 use crate::cloud::card::Card;
-use crate::space::texture::srgb;
 
 /// A card and the triangles of the model that it shows.
 #[derive(Clone, Debug, Default)]
@@ -90,12 +89,13 @@ impl Foliage {
                 .filter(|(_, chart)| chart.shape != Shape::Window)
                 .map(|(g, chart)| {
                     let drawn = project(model, g.triangles.iter().copied(), chart, samples);
-                    (chart, drawn)
+                    let texels = drawn.texels.into_iter().map(Stored::from);
+                    (chart, texels.collect::<Vec<Stored>>())
                 })
                 .collect();
-            for (chart, projection) in projected {
+            for (chart, texels) in projected {
                 for (local, at) in placed_texels(chart, width) {
-                    self.texels[at] = projection.texels[local].into();
+                    self.texels[at] = texels[local];
                     self.owned[at] = true;
                 }
             }
@@ -160,20 +160,16 @@ impl Foliage {
     pub fn threshold(&mut self, t: f32, floor: u8) {
         self.alpha = self
             .texels
-            .iter()
+            .par_iter()
             .map(|x| if x.coverage() >= t { 255 } else { floor })
             .collect();
     }
 
     /// Bleeds colours into empty texels; call once, after the last use of `coverage` as it is.
     pub fn bleed(&mut self) {
-        let weights: Vec<f32> = self.texels.iter().map(Stored::coverage).collect();
         let mut fill = |get: fn(&Stored) -> Vec3, set: fn(&mut Stored, Vec3)| {
-            let mut values: Vec<Vec3> = self.texels.iter().map(get).collect();
-            bleed(&mut values, &weights, self.size);
-            for (texel, value) in self.texels.iter_mut().zip(values) {
-                set(texel, value);
-            }
+            let weighted = |texel: &Stored| (get(texel), texel.coverage());
+            bleed(&mut self.texels, self.size, weighted, set);
         };
         fill(Stored::color, Stored::set_color);
         fill(Stored::normal, Stored::set_normal);
@@ -205,29 +201,29 @@ impl Foliage {
 
     /// Base colour with alpha, tangent-space normals, and occlusion-roughness-metalness.
     pub fn images(&self) -> [Image; 3] {
-        let page = |name: &str, pixel: &dyn Fn(&Stored, u8) -> [u8; 4]| Image {
-            name: name.into(),
-            width: self.size[0],
-            height: self.size[1],
-            rgba: Arc::new(
-                self.texels
-                    .iter()
-                    .zip(&self.alpha)
-                    .flat_map(|(t, &a)| pixel(t, a))
-                    .collect(),
-            ),
+        let page = |name: &str, pixel: fn(&Stored, u8) -> [u8; 4]| {
+            let texels = self.texels.par_iter().zip(&self.alpha);
+            let pixels: Vec<[u8; 4]> = texels.map(|(t, &a)| pixel(t, a)).collect();
+            Image {
+                name: name.into(),
+                width: self.size[0],
+                height: self.size[1],
+                rgba: Arc::new(pixels.into_flattened()),
+            }
         };
-        let byte = |v: f32| (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8;
+        fn byte(v: f32) -> u8 {
+            (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8
+        }
         [
-            page(IMAGES[0], &|t, a| {
-                let [r, g, b] = t.color().to_array().map(srgb);
+            page(IMAGES[0], |t, a| {
+                let [r, g, b] = t.srgb();
                 [r, g, b, a]
             }),
-            page(IMAGES[1], &|t, _| {
+            page(IMAGES[1], |t, _| {
                 let n = t.normal().normalize_or(Vec3::Z) * 0.5 + 0.5;
                 [byte(n.x), byte(n.y), byte(n.z), 255]
             }),
-            page(IMAGES[2], &|t, _| {
+            page(IMAGES[2], |t, _| {
                 let [o, r, m] = t.orm().to_array().map(byte);
                 [o, r, m, 255]
             }),

@@ -1,8 +1,11 @@
 //! Texels as a page keeps them: a third of the size of the numbers that they are made from.
 
+use std::sync::LazyLock;
+
 use glam::Vec3;
 
 use super::project::Texel;
+use crate::space::texture::srgb;
 
 /// A texel in 14 bytes. Colours have 16 bits, because 8 linear ones band in shadows; the rest has
 /// the 8 bits that are written.
@@ -42,6 +45,16 @@ impl Stored {
     /// Mean linear colour of the covered part.
     pub fn color(&self) -> Vec3 {
         Vec3::from(self.color.map(|c| f32::from(c) / 65_535.0))
+    }
+
+    /// The colour as it is written.
+    pub fn srgb(&self) -> [u8; 3] {
+        static TABLE: LazyLock<Vec<u8>> = LazyLock::new(|| {
+            let light = |c: u16| f32::from(c) / 65_535.0;
+            (0..=u16::MAX).map(|c| srgb(light(c))).collect()
+        });
+        let table = &*TABLE;
+        self.color.map(|c| table[usize::from(c)])
     }
 
     /// Sets [`Stored::color`].
@@ -93,6 +106,7 @@ mod tests {
         assert!((stored.color() - texel.color).abs().max_element() <= 0.51 / 65_535.0);
         assert!((stored.normal() - texel.normal).abs().max_element() <= 0.51 / 127.0);
         assert!((stored.orm() - texel.orm).abs().max_element() <= 0.51 / 255.0);
+        assert_eq!(stored.srgb(), [0, srgb(0.001_23), 255]);
         assert_eq!(std::mem::size_of::<Stored>(), 14);
     }
 }
