@@ -1,6 +1,7 @@
 //! What the manifest says of a tree and its levels.
 
 use glam::Vec3;
+use rayon::prelude::*;
 
 use crate::botany::model::Frame;
 use crate::botany::tree::{self, NO_NODE, Organ, Tree};
@@ -44,7 +45,10 @@ impl<'a> Describer<'a> {
             tree,
             elements,
             scene,
-            sigma: elements.iter().map(|e| occlusion.sigma(e.center)).collect(),
+            sigma: elements
+                .par_iter()
+                .map(|e| occlusion.sigma(e.center))
+                .collect(),
             depth,
         }
     }
@@ -124,6 +128,8 @@ impl<'a> Describer<'a> {
                 .zip(&made.charts)
                 .zip(owners(&made.charts, made.atlas))
                 .enumerate()
+                .collect::<Vec<_>>()
+                .into_par_iter()
                 .map(|(index, (((group, members), chart), copy_of))| Card {
                     copy_of,
                     back: made.back_of(index as u32).map(Chart::rectangle_in_atlas),

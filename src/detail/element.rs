@@ -5,10 +5,11 @@
 //! fitting need: their moments, weighted by surface area.
 
 use glam::Vec3;
+use rayon::prelude::*;
 
 use super::opaque::Opaque;
 use crate::botany::model::Model;
-use crate::botany::tree::{NO_NODE, Organ, Tree};
+use crate::botany::tree::{Leaf, NO_NODE, Organ, Tree};
 use crate::cloud::occlusion::Occlusion;
 use crate::space::eigen::Moments;
 
@@ -85,18 +86,20 @@ pub fn elements(tree: &Tree) -> Vec<Element> {
     let visible = Visible::of(tree);
     let solid_radius = SOLID_SHARE * tree.model.height();
     let subtree_of_chain = subtree_of_chain(tree);
-    let mut out = Vec::with_capacity(tree.leaves.len() * 2);
-    for leaf in &tree.leaves {
+    let of_leaf = |leaf: &Leaf| {
         let subtree = match leaf.node {
             NO_NODE => 0,
             node => subtree_of_chain[tree.skeleton.nodes[node as usize].chain as usize],
         };
-        for sheet in sheets(&tree.model, &leaf.triangles) {
-            let mut leaf = element(&tree.model, sheet, &opacity, None, subtree);
-            leaf.scale(visible.weight(leaf.center));
-            out.push(leaf);
-        }
-    }
+        let weight = |mut sheet: Element| {
+            sheet.scale(visible.weight(sheet.center));
+            sheet
+        };
+        let sheets = sheets(&tree.model, &leaf.triangles).into_iter();
+        let elements = sheets.map(|sheet| element(&tree.model, sheet, &opacity, None, subtree));
+        elements.map(weight).collect::<Vec<_>>()
+    };
+    let mut out: Vec<Element> = tree.leaves.par_iter().flat_map_iter(of_leaf).collect();
     for (chain, triangles) in wood_by_chain(tree).into_iter().enumerate() {
         if !triangles.is_empty() {
             let subtree = subtree_of_chain[chain];
@@ -150,13 +153,14 @@ fn element(
         moments.add_triangle(corners, area);
     }
     let center = moments.mean.as_vec3();
-    let outline = match chain {
+    let mut outline: Vec<Vec3> = match chain {
         Some(_) => Vec::new(),
         None => triangles
             .iter()
             .flat_map(|&t| opacity.outline(model, t))
             .collect(),
     };
+    outline.shrink_to_fit();
     // A tube of surface S covers S/4 in the mean over all directions, as a leaf of one-sided area
     // S/2 does (Cauchy): wood and leaves then weigh alike.
     if chain.is_some() {

@@ -11,16 +11,57 @@ use crate::space::raster::{
 };
 use crate::space::texture::cutoff;
 
+/// One sample each: masks are fine enough.
+const SAMPLING: Sampling = Sampling {
+    side: 1,
+    mips: Mips::Base,
+};
+
 /// Masks of the original from the training directions.
 pub struct Original {
     /// The directions.
     pub directions: Vec<Direction>,
     /// One mask a direction, at `samples_per_unit`.
-    masks: Vec<Mask>,
+    masks: Vec<Bits>,
     /// Samples for a normalised unit.
     samples_per_unit: f32,
     /// Height of the tree in normalised units.
     pub height: f32,
+}
+
+/// A mask in an eighth of its size: those of all directions wait for all levels.
+struct Bits {
+    width: u32,
+    height: u32,
+    /// Rows of whole bytes, from the top; the first sample of a byte is its lowest bit.
+    bits: Vec<u8>,
+}
+
+impl Bits {
+    fn of(mask: &Mask) -> Self {
+        let rows = mask.samples.chunks(mask.width.max(1) as usize);
+        let byte = |samples: &[u8]| samples.iter().rev().fold(0, |byte, s| byte << 1 | (s & 1));
+        Self {
+            width: mask.width,
+            height: mask.height,
+            bits: rows.flat_map(|row| row.chunks(8).map(byte)).collect(),
+        }
+    }
+
+    /// Samples that are hit.
+    fn count(&self) -> u64 {
+        self.bits.iter().map(|b| u64::from(b.count_ones())).sum()
+    }
+
+    /// The samples of a row, 0 or 1.
+    fn row(&self, y: u32) -> impl Iterator<Item = u8> + '_ {
+        let across = self.width.div_ceil(8) as usize;
+        let bytes = &self.bits[y as usize * across..][..across];
+        let samples = bytes
+            .iter()
+            .flat_map(|byte| (0..8).map(move |i| byte >> i & 1));
+        samples.take(self.width as usize)
+    }
 }
 
 /// A view of the unit sphere around the tree at `pixels` pixels a unit.
@@ -34,14 +75,6 @@ pub fn camera(direction: &Direction, pixels: f32) -> Camera {
         side,
         side,
     )
-}
-
-/// Draws where `scene` is, one mask a camera.
-pub fn masks(scene: &Scene, cameras: &[Camera], sampling: Sampling) -> Vec<Mask> {
-    cameras
-        .par_iter()
-        .map(|c| coverage(scene, c, sampling))
-        .collect()
 }
 
 impl Original {
@@ -80,12 +113,11 @@ impl Original {
             .iter()
             .map(|d| camera(d, samples_per_unit))
             .collect();
-        let sampling = Sampling {
-            side: 1,
-            mips: Mips::Base,
-        };
         Self {
-            masks: masks(&scene, &cameras, sampling),
+            masks: cameras
+                .par_iter()
+                .map(|camera| Bits::of(&coverage(&scene, camera, SAMPLING)))
+                .collect(),
             directions,
             samples_per_unit,
             height,
@@ -102,7 +134,7 @@ impl Original {
         let unit = f64::from(self.samples_per_unit);
         self.masks
             .iter()
-            .map(|m| m.area() / (unit * unit))
+            .map(|m| m.count() as f64 / (unit * unit))
             .collect()
     }
 
@@ -116,17 +148,11 @@ impl Original {
                 let size = [mask.width / pool, mask.height / pool];
                 let cells = self.samples_per_unit / pool as f32;
                 let taken = match wood {
-                    Some(scene) => pooled(
-                        &coverage(
-                            scene,
-                            &view,
-                            Sampling {
-                                side: 1,
-                                mips: Mips::Base,
-                            },
-                        ),
-                        pool,
-                    ),
+                    Some(scene) => {
+                        let drawn = coverage(scene, &view, SAMPLING);
+                        let rows = drawn.samples.chunks(drawn.width.max(1) as usize);
+                        pooled(rows.map(|row| row.iter().copied()), size, pool)
+                    }
                     None => vec![false; (size[0] * size[1]) as usize],
                 };
                 Target {
@@ -134,7 +160,7 @@ impl Original {
                     down: -view.up * cells,
                     base: Vec2::new(mask.width as f32, mask.height as f32) / (2.0 * pool as f32),
                     size,
-                    wanted: pooled(mask, pool),
+                    wanted: pooled((0..mask.height).map(|y| mask.row(y)), size, pool),
                     taken,
                 }
             })
@@ -142,21 +168,22 @@ impl Original {
     }
 }
 
-/// Cells of which at least half of the samples are covered.
-fn pooled(mask: &Mask, pool: u32) -> Vec<bool> {
-    let (w, h) = (mask.width / pool, mask.height / pool);
+/// Cells of `pool` x `pool` samples of which at least half are covered, from rows of samples.
+fn pooled<R: Iterator<Item = u8>>(
+    mut rows: impl Iterator<Item = R>,
+    [w, h]: [u32; 2],
+    pool: u32,
+) -> Vec<bool> {
     let mut out = Vec::with_capacity((w * h) as usize);
-    for y in 0..h {
-        for x in 0..w {
-            let rows = (y * pool..(y + 1) * pool).map(|r| {
-                let from = (r * mask.width + x * pool) as usize;
-                mask.samples[from..from + pool as usize]
-                    .iter()
-                    .map(|&s| u32::from(s))
-                    .sum::<u32>()
-            });
-            out.push(rows.sum::<u32>() * 2 >= pool * pool);
+    let mut sums = vec![0u32; w as usize];
+    for _ in 0..h {
+        sums.fill(0);
+        for mut row in rows.by_ref().take(pool as usize) {
+            for sum in &mut sums {
+                *sum += row.by_ref().take(pool as usize).map(u32::from).sum::<u32>();
+            }
         }
+        out.extend(sums.iter().map(|sum| sum * 2 >= pool * pool));
     }
     out
 }
@@ -184,5 +211,36 @@ fn wrap(w: Wrap) -> crate::space::raster::Wrap {
         Wrap::Repeat => crate::space::raster::Wrap::Repeat,
         Wrap::Mirror => crate::space::raster::Wrap::Mirror,
         Wrap::Clamp => crate::space::raster::Wrap::Clamp,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn masks_keep_their_samples_in_bits_and_cells_are_covered_by_half() {
+        // 11 samples wide: rows end within a byte.
+        let samples: Vec<u8> = (0..11 * 6u32).map(|i| u8::from(i * i % 7 < 3)).collect();
+        let mask = Mask {
+            width: 11,
+            height: 6,
+            side: 1,
+            samples: samples.clone(),
+        };
+        let bits = Bits::of(&mask);
+        let again: Vec<u8> = (0..6).flat_map(|y| bits.row(y)).collect();
+        assert_eq!(again, samples);
+        assert_eq!(bits.count() as f64, mask.area());
+        for pool in [2, 3] {
+            let size = [11 / pool, 6 / pool];
+            let cells = pooled((0..6).map(|y| bits.row(y)), size, pool);
+            for (at, cell) in (0..).zip(cells) {
+                let (x, y) = (at % size[0] * pool, at / size[0] * pool);
+                let inside = (y..y + pool).flat_map(|y| (x..x + pool).map(move |x| y * 11 + x));
+                let sum: u32 = inside.map(|i| u32::from(samples[i as usize])).sum();
+                assert_eq!(cell, 2 * sum >= pool * pool, "{pool}: {at}");
+            }
+        }
     }
 }
