@@ -32,7 +32,7 @@ pub use crate::request::Request;
 use crate::sharing;
 use crate::verdict::{REFUSED, in_band, refusal};
 use crate::watch::{Deadline, Watch, begin, part, step};
-use crate::written::{Share, encoded, sheets, write};
+use crate::written::{Share, encode_images_of, sheets, write};
 
 /// What was baked.
 #[derive(Clone, Debug, Default)]
@@ -234,21 +234,21 @@ fn levels(
         range: ranges[0],
         ..manifest::Level::default()
     });
-    let (pngs, all) = encoded(all)?;
-    let mut packed = vec![Packed {
+    let mut packed = Vec::with_capacity(rungs.len() + 1);
+    let mut last = Packed {
         name: name(0),
-        pngs,
+        pngs: Vec::new(),
         scene: all,
         extras: extras(0, &ranges[0], 0.0, height_m, &request.scene),
         range: ranges[0],
-    }];
+    };
     step(watch)?;
     let mut shares = Vec::with_capacity(rungs.len());
     let heights: Vec<u32> = rungs.iter().map(|r| pixels(r.height_px)).collect();
     let ruler = (request.recipe.sharing > 0.0)
         .then(|| sharing::Ruler::new(&tree.model, &heights, &settings()));
     for (rung, &range) in rungs.iter().zip(&ranges[1..]) {
-        let level = packed.len();
+        let level = packed.len() + 1;
         let enough = request.max_error_px.map_or(u64::MAX, |pixels| {
             baker
                 .triangles_within(pixels, rung.height_px)
@@ -259,7 +259,12 @@ fn levels(
             ..*rung
         };
         let level_wanted = LevelRequest::of(&rung, request.recipe.method);
-        let made = baker.level(level_wanted, watch)?;
+        // A level's images are encoded while the next one is made: PNG of one page keeps one core busy.
+        let (made, encoded) = rayon::join(
+            || baker.level(level_wanted, watch),
+            || encode_images_of(&mut last),
+        );
+        let (made, ()) = (made?, encoded?);
         let (made, share) = match &ruler {
             Some(ruler) => {
                 let most = (pixels(rung.height_px), request.recipe.sharing);
@@ -272,19 +277,22 @@ fn levels(
             }
         };
         shares.push(share);
-        part(watch, "encode")?;
+        part(watch, "describe")?;
         let described = describer.level(level, &(name(level) + ".glb"), &made, range);
-        let (pngs, scene) = encoded(made.scene)?;
-        packed.push(Packed {
+        let next = Packed {
             name: name(level),
-            pngs,
-            scene,
+            pngs: Vec::new(),
+            scene: made.scene,
             extras: extras(level, &range, described.error_m, height_m, &request.scene),
             range,
-        });
+        };
+        packed.push(std::mem::replace(&mut last, next));
         manifest.levels.push(described);
         step(watch)?;
     }
+    part(watch, "encode")?;
+    encode_images_of(&mut last)?;
+    packed.push(last);
     let candidates = match request.page {
         true => baker.candidates(tree.model.frame.radius),
         false => Vec::new(),

@@ -11,20 +11,19 @@ use crate::export::gltf::write_glb;
 use crate::export::manifest::SUFFIX;
 use crate::export::package::Package;
 use crate::export::png::encode_images;
-use crate::export::surface::Scene;
 use crate::report::schema::SharedLevel;
 use crate::watch::{Watch, step};
 
 /// What a level shares, and the contact sheet of it.
 pub type Share = (SharedLevel, Option<Vec<u8>>);
 
-/// A scene's images as PNG, and the scene without their pixels: all levels wait for the last one.
-pub fn encoded(mut scene: Scene) -> Result<(Vec<Vec<u8>>, Scene)> {
-    let pngs = encode_images(&scene)?;
-    for image in &mut scene.images {
+/// Turns a level's images into PNG and drops their pixels: all levels wait for the last one.
+pub fn encode_images_of(level: &mut Packed) -> Result<()> {
+    level.pngs = encode_images(&level.scene)?;
+    for image in &mut level.scene.images {
         image.rgba = Arc::default();
     }
-    Ok((pngs, scene))
+    Ok(())
 }
 
 /// Writes every level alone and all in one; returns the names of the package's files.
