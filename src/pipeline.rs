@@ -29,7 +29,9 @@ use crate::recipe::Method;
 use crate::report::schema::Report;
 use crate::report::{Judged, Making, Recognised, Settings, heights, judge};
 pub use crate::request::Request;
+use crate::scene::Scene;
 use crate::sharing;
+use crate::space::view::Lens;
 use crate::verdict::{REFUSED, in_band, refusal};
 use crate::watch::{Deadline, Watch, begin, part, step};
 use crate::written::{Share, encode_images_of, sheets, write};
@@ -120,7 +122,8 @@ fn made(request: &Request, watch: &dyn Watch) -> Result<Baked> {
     };
     let judged = read_back(&package, &packed[1..], &rungs)?;
     begin(watch, "measure", heights(&judged).len() as u64)?;
-    let report = measure(&tree.model, &files[0], &judged, watch)?;
+    let measured = (&tree.model, files[0].as_str());
+    let report = judge(measured, &judged, &settings(&request.scene), || step(watch))?;
     let sharing = sharing::told(&report, shares);
     let mut warnings = levels.tree.warnings.clone();
     if request.recipe.sharing > 0.0 {
@@ -246,7 +249,7 @@ fn levels(
     let mut shares = Vec::with_capacity(rungs.len());
     let heights: Vec<u32> = rungs.iter().map(|r| pixels(r.height_px)).collect();
     let ruler = (request.recipe.sharing > 0.0)
-        .then(|| sharing::Ruler::new(&tree.model, &heights, &settings()));
+        .then(|| sharing::Ruler::new(&tree.model, &heights, &settings(&request.scene)));
     for (rung, &range) in rungs.iter().zip(&ranges[1..]) {
         let level = packed.len() + 1;
         let enough = request.max_error_px.map_or(u64::MAX, |pixels| {
@@ -321,19 +324,21 @@ fn read_back(package: &Package, packed: &[Packed], rungs: &[Rung]) -> Result<Vec
     packed.iter().zip(rungs).map(read).collect()
 }
 
-fn measure(original: &Model, file: &str, judged: &[Judged], watch: &dyn Watch) -> Result<Report> {
-    judge((original, file), judged, &settings(), || step(watch))
-}
-
 /// Height of a tree at which a level is measured.
 fn pixels(height: f64) -> u32 {
     (height.round() as u32).max(8)
 }
 
+/// The lens of the screen that a scene states distances for.
+pub fn lens(scene: &Scene) -> Lens {
+    Lens::of_screen(scene.screen_height_px.into(), scene.fov_deg)
+}
+
 /// The views of the report.
-fn settings() -> Settings {
+fn settings(scene: &Scene) -> Settings {
     Settings {
         azimuth_offset_deg: REPORT_OFFSET_DEG,
+        lens: lens(scene),
         ..Settings::default()
     }
 }

@@ -14,7 +14,6 @@ use crate::export::share::sheet;
 use crate::level::Level;
 use crate::report::schema::{self, Figure, Report, SharedLevel, Sharing};
 use crate::report::{Drawable, Reference, Settings, texture_bytes};
-use crate::space::raster::Sampling;
 
 /// The worst view may lose so many times as much as the mean.
 const WORST: f64 = 2.0;
@@ -40,11 +39,13 @@ impl<'a> Ruler<'a> {
     /// For levels that start at these heights, pixels.
     pub fn new(original: &'a Model, heights_px: &[u32], settings: &Settings) -> Self {
         let mut heights = heights_px.to_vec();
-        heights.sort_unstable_by_key(|&px| std::cmp::Reverse(px));
+        heights.sort_unstable();
+        heights.dedup();
         let own = Drawable::silhouette(original);
         let views = settings.view_set();
+        let of = |&px: &u32| Reference::of(&own, original, &views, settings.lens, px);
         Self {
-            references: Reference::each(&own, original, &views, &heights),
+            references: heights.iter().map(of).collect(),
             original,
         }
     }
@@ -59,7 +60,7 @@ impl<'a> Ruler<'a> {
         model.keep_only_base_colors();
         let mut known = self.references.iter();
         let reference = known.find(|r| r.height_px() == height_px);
-        let figures = reference.map(|r| r.compare(&model, Sampling::REFERENCE));
+        let figures = reference.map(|r| r.compare(&model));
         Ok((figures.unwrap_or_default().f1, texture_bytes))
     }
 

@@ -13,7 +13,6 @@ use pleach::recipe::Recipe;
 use pleach::report::Reference;
 use pleach::runtime::{ActiveCut, Drawn, Forest, Form, Place, Plain, Shown, View};
 use pleach::scene::Scene;
-use pleach::space::raster::Sampling;
 use pleach::space::view::views;
 use pleach::threads::pool;
 use pleach::watch::Unwatched;
@@ -234,8 +233,7 @@ fn billboards_of_tips_look_like_their_geometry() {
         let original = load(&out.join(&geometry.file)).unwrap();
         let level = load(&out.join(&billboards.file)).unwrap();
         let height_px = (64.0 * original.height()) as u32;
-        let found = Reference::new(&original, &views(8, 5.0), height_px.max(8))
-            .compare(&level, Sampling::REFERENCE);
+        let found = Reference::new(&original, &views(8, 5.0), height_px.max(8)).compare(&level);
         let area = found.area_ratio.mean;
         assert!((0.8..1.25).contains(&area), "{}: {area}", billboards.node);
         assert!(

@@ -19,7 +19,6 @@ use pleach::export::surface::scene_of_model;
 use pleach::recipe::Recipe;
 use pleach::report::schema::Instancing;
 use pleach::report::{Reference, draw_calls};
-use pleach::space::raster::Sampling;
 use pleach::space::view::views;
 
 fn tree(file: &Path) -> Tree {
@@ -109,8 +108,7 @@ fn the_sample_oak_unpacked_is_the_original_and_looks_like_it() {
     assert_eq!(told.file_bytes, bytes.len() as u64);
     assert_eq!(draw_calls(&model), 1 + told.prototypes);
     assert_equal(&oak, &model);
-    let seen =
-        Reference::new(&oak.model, &views(4, 11.0), 256).compare(&model, Sampling::REFERENCE);
+    let seen = Reference::new(&oak.model, &views(4, 11.0), 256).compare(&model);
     assert!(seen.f1.worst > 0.9995, "{seen:?}");
 }
 

@@ -7,9 +7,9 @@ use crate::botany::Model;
 use crate::botany::load::load;
 use crate::error::{Error, Result};
 use crate::report::schema::{Figure, Level, Report, SizeFigures};
-use crate::report::{Content, Settings, contact_sheet, evaluate, start_height_px};
+use crate::report::{Content, Settings, Start, contact_sheet, evaluate, start};
 use crate::space::raster::Sampling;
-use crate::space::view::View;
+use crate::space::view::{Lens, View};
 
 /// Measures levels of detail against their original; takes any glTF, also another tool's.
 #[derive(clap::Args, Debug)]
@@ -38,6 +38,10 @@ pub struct Args {
     /// Draw the levels also as an engine does: box mips, alpha test, fourfold multisampling.
     #[arg(long)]
     client: bool,
+    /// Look along parallel lines, as figures in the literature are made, not through the lens of a
+    /// screen (that of the levels' scene, else 1080 lines and 60 degrees).
+    #[arg(long)]
+    orthographic: bool,
     /// Compare silhouettes alone: no colours, distances, normals and jumps; a fraction of the time.
     #[arg(long)]
     silhouettes: bool,
@@ -64,9 +68,14 @@ fn parse_elevation(text: &str) -> std::result::Result<f32, String> {
 pub fn run(args: &Args) -> Result<()> {
     let original = load(&args.original)?;
     let (files, mut own_heights_px) = split(&args.levels);
-    for (file, height) in files.iter().zip(&mut own_heights_px) {
-        *height = height.or_else(|| start_height_px(file));
+    let told: Vec<Start> = files.iter().map(|file| start(file)).collect();
+    for (told, height) in told.iter().zip(&mut own_heights_px) {
+        *height = height.or(told.height_px);
     }
+    let lens = match args.orthographic {
+        true => Lens::Parallel,
+        false => told.iter().find_map(|t| t.lens).unwrap_or_default(),
+    };
     let levels: Vec<Model> = files.iter().map(|file| load(file)).collect::<Result<_>>()?;
     let settings = Settings {
         heights_px: args.height.clone(),
@@ -74,6 +83,7 @@ pub fn run(args: &Args) -> Result<()> {
         views: args.views,
         azimuth_offset_deg: args.azimuth_offset,
         elevations_deg: args.elevations.clone(),
+        lens,
         client: args.client,
         appearance: !args.silhouettes,
     };
@@ -145,6 +155,7 @@ fn write(
         original,
         levels: &models,
         views: &settings.view_set(),
+        lens: settings.lens,
         made: None,
     };
     let file = folder.join("report.html");
@@ -157,7 +168,13 @@ fn write(
         ),
     ] {
         let Some(sampling) = sampling else { continue };
-        let (width, height, rgba) = contact_sheet(original, &models, &shown, height_px, sampling);
+        let (width, height, rgba) = contact_sheet(
+            original,
+            &models,
+            &shown,
+            (settings.lens, height_px),
+            sampling,
+        );
         let file = folder.join(name);
         image::save_buffer(&file, &rgba, width, height, image::ColorType::Rgba8)
             .map_err(|e| Error::io(&file, "write", std::io::Error::other(e)))?;
@@ -226,7 +243,7 @@ fn table(report: &Report) -> String {
             head.clear();
         }
     }
-    out += "\nE: error over that of the original moved by half a pixel; 1 is as near as that. Reference: 4 x 4 samples a pixel.\n";
+    out += "\nE: error over that of the original moved by half a pixel; 1 is as near as that. Reference: 4 x 4 samples a pixel, more under 128 px.\n";
     if report.levels.iter().any(|l| l.orbit.is_some()) {
         out += &looks(report);
     }

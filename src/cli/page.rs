@@ -6,7 +6,7 @@ use crate::botany::Model;
 use crate::botany::load::{load, load_with};
 use crate::error::{Error, Result};
 use crate::export::package::beside;
-use crate::pipeline::{Baked, REPORT_OFFSET_DEG, Request};
+use crate::pipeline::{Baked, REPORT_OFFSET_DEG, Request, lens};
 use crate::report::schema::{Bake, Report};
 use crate::report::{Content, Made, Settings, evaluate};
 
@@ -34,6 +34,7 @@ pub fn write(request: &Request, baked: &Baked, took: &Bake) -> Result<PathBuf> {
             .map(|row| row.sizes.first().map(|s| s.height_px))
             .collect(),
         azimuth_offset_deg: REPORT_OFFSET_DEG,
+        lens: lens(&request.scene),
         client: true,
         appearance: true,
         ..Settings::default()
@@ -63,6 +64,7 @@ pub fn write(request: &Request, baked: &Baked, took: &Bake) -> Result<PathBuf> {
         original: &original,
         levels: &models,
         views: &settings.view_set(),
+        lens: settings.lens,
         made: Some(Made {
             making: &baked.making,
             took,

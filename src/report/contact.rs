@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::drawable::Drawable;
 use crate::botany::Model;
 use crate::space::raster::{Camera, Light, Picture, Sampling, draw};
-use crate::space::view::View;
+use crate::space::view::{Lens, View};
 
 const BACKGROUND: [u8; 3] = [255, 255, 255];
 /// Pixels of both silhouettes.
@@ -23,11 +23,14 @@ pub fn contact_sheet(
     original: &Model,
     levels: &[&Model],
     views: &[View],
-    height_px: u32,
+    (lens, height_px): (Lens, u32),
     sampling: Sampling,
 ) -> (u32, u32, Vec<u8>) {
     let height = original.height();
-    let cameras: Vec<Camera> = views.iter().map(|v| v.camera(height, height_px)).collect();
+    let cameras: Vec<Camera> = views
+        .iter()
+        .map(|v| v.camera_through(lens, height, height_px))
+        .collect();
     let shaded = |model: &Model, sampling| -> Vec<Picture> {
         let drawable = Drawable::shaded(model);
         let (scene, place) = (drawable.scene(), drawable.placement_in(original.frame));

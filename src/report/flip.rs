@@ -106,7 +106,7 @@ fn hunt([l, a, b]: [f32; 3]) -> [f32; 3] {
 
 /// HyAB: city-block in lightness, Euclidean in chroma.
 fn distance(p: [f32; 3], q: [f32; 3]) -> f32 {
-    (p[0] - q[0]).abs() + (p[1] - q[1]).hypot(p[2] - q[2])
+    (p[0] - q[0]).abs() + hypot(p[1] - q[1], p[2] - q[2])
 }
 
 impl Seen {
@@ -136,7 +136,7 @@ impl Seen {
         let strength = |derivative: &[f32]| -> Vec<f32> {
             let x = both(&grey, derivative, &filters.gauss);
             let y = columns(&smooth, width, derivative);
-            x.iter().zip(&y).map(|(x, y)| x.hypot(*y)).collect()
+            x.iter().zip(&y).map(|(&x, &y)| hypot(x, y)).collect()
         };
         Self {
             color: color.collect(),
@@ -171,9 +171,7 @@ pub(super) fn rows(plane: &[f32], width: usize, weights: &[f32]) -> Vec<f32> {
         padded[..radius].fill(row[0]);
         padded[radius..radius + width].copy_from_slice(row);
         padded[radius + width..].fill(row[width - 1]);
-        for (k, weight) in weights.iter().enumerate() {
-            add(out, &padded[k..k + width], *weight);
-        }
+        weighted(out, weights, |k| &padded[k..k + width]);
     }
     out
 }
@@ -183,18 +181,40 @@ pub(super) fn columns(plane: &[f32], width: usize, weights: &[f32]) -> Vec<f32> 
     let (radius, height) = (weights.len() / 2, plane.len() / width);
     let mut out = vec![0.0; plane.len()];
     for (y, out) in out.chunks_exact_mut(width).enumerate() {
-        for (k, weight) in weights.iter().enumerate() {
+        weighted(out, weights, |k| {
             let from = (y + k).saturating_sub(radius).min(height - 1) * width;
-            add(out, &plane[from..from + width], *weight);
-        }
+            &plane[from..from + width]
+        });
     }
     out
 }
 
-fn add(out: &mut [f32], row: &[f32], weight: f32) {
-    for (out, value) in out.iter_mut().zip(row) {
-        *out += weight * value;
+/// Sums of rows by weight. So many sums at a time stay in registers while all rows pass by.
+fn weighted<'a>(out: &mut [f32], weights: &[f32], row: impl Fn(usize) -> &'a [f32]) {
+    const WIDE: usize = 16;
+    let (wide, rest) = out.as_chunks_mut::<WIDE>();
+    let done = wide.len() * WIDE;
+    for (i, out) in wide.iter_mut().enumerate() {
+        let mut sums = [0.0; WIDE];
+        for (k, weight) in weights.iter().enumerate() {
+            if let Some(values) = row(k)[i * WIDE..].first_chunk::<WIDE>() {
+                for (sum, value) in sums.iter_mut().zip(values) {
+                    *sum += weight * value;
+                }
+            }
+        }
+        *out = sums;
     }
+    for (k, weight) in weights.iter().enumerate() {
+        for (out, value) in rest.iter_mut().zip(&row(k)[done..]) {
+            *out += weight * value;
+        }
+    }
+}
+
+/// Length of the hypotenuse, of numbers whose squares are numbers.
+fn hypot(x: f32, y: f32) -> f32 {
+    (x * x + y * y).sqrt()
 }
 
 #[cfg(test)]

@@ -1,12 +1,10 @@
 //! Measures the levels of a package, each at the sizes that it is for.
 
-use super::drawable::Drawable;
-use super::evaluate::{Settings, evaluate};
-use super::reference::Reference;
+use super::evaluate::{Settings, rows};
+use super::measure::{Asked, actors, measure};
 use super::schema::Report;
 use crate::botany::Model;
 use crate::error::Result;
-use crate::space::raster::Sampling;
 
 /// A level of a package, read back from its file.
 #[derive(Clone, Debug)]
@@ -40,37 +38,46 @@ pub fn judge(
     settings: &Settings,
     mut step: impl FnMut() -> Result<()>,
 ) -> Result<Report> {
-    let costs_only = Settings {
-        heights_px: Vec::new(),
-        ..settings.clone()
-    };
     let named: Vec<(&Model, &str)> = levels.iter().map(|l| (&l.model, l.file.as_str())).collect();
-    let mut report = evaluate(original, &named, &costs_only);
-    for (row, level) in report.levels.iter_mut().zip(levels) {
+    let mut rows = rows(original, &named, settings);
+    for (row, level) in rows.iter_mut().skip(1).zip(levels) {
         row.distance_m = level.distance_m;
     }
-    let own = Drawable::silhouette(original.0);
-    let drawables: Vec<Drawable> = levels
-        .iter()
-        .map(|l| Drawable::silhouette(&l.model))
-        .collect();
-    let views = settings.view_set();
-    let heights_px = heights(levels);
-    for reference in Reference::each(&own, original.0, &views, &heights_px) {
-        let height_px = reference.height_px();
-        if let Some(row) = &mut report.original {
-            row.sizes.push(reference.compare_client(&own));
-        }
-        for ((row, level), drawable) in report.levels.iter_mut().zip(levels).zip(&drawables) {
-            if !level.heights_px.contains(&height_px) {
-                continue;
-            }
-            let mut figures = reference.compare_drawable(drawable, Sampling::REFERENCE);
-            let client = reference.compare_client(drawable);
-            figures.client = Some(Box::new(client));
-            row.sizes.push(figures);
+    let all = heights(levels);
+    let models: Vec<&Model> = levels.iter().map(|l| &l.model).collect();
+    let own: Vec<Vec<u32>> = levels.iter().map(|l| l.heights_px.clone()).collect();
+    let asked = Asked {
+        original: original.0,
+        levels: &models,
+        views: &settings.view_set(),
+        lens: settings.lens,
+        heights_px: &own,
+        original_px: &all,
+        starts_px: &[],
+        looks: false,
+        client: true,
+        base_colors: false,
+    };
+    let actors = actors(&asked);
+    for &height_px in &all {
+        for (row, found) in rows.iter_mut().zip(measure(&asked, &actors, &[height_px])) {
+            row.sizes.extend(found.sizes);
         }
         step()?;
     }
-    Ok(report)
+    let measured = rows.split_off(1);
+    let mut whole = rows.pop();
+    // Of the original only what an engine makes of it is told: it has no error beside itself.
+    for size in whole.iter_mut().flat_map(|row| &mut row.sizes) {
+        if let Some(client) = size.client.take() {
+            *size = *client;
+        }
+    }
+    Ok(Report {
+        position_step_m: original.0.position_step,
+        focal_px: settings.lens.focal_px().map(f64::from),
+        original: whole,
+        levels: measured,
+        ..Report::default()
+    })
 }

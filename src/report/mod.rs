@@ -3,21 +3,22 @@
 //! What is measured is what was written: files are loaded again and drawn over the original's
 //! pictures, supersampled and as an engine draws them.
 
-mod appearance;
 pub mod band;
-mod base_color;
 mod contact;
 mod cost;
 mod drawable;
 mod evaluate;
 mod flip;
 mod judge;
+mod measure;
+mod outline;
 mod page;
 mod reference;
 pub mod schema;
 mod shot;
 mod silhouette;
 mod stage;
+mod stand;
 mod start;
 
 pub use contact::contact_sheet;
@@ -28,4 +29,4 @@ pub use judge::{Judged, heights, judge};
 pub use page::{Content, Made, Making, Recognised};
 pub use reference::Reference;
 pub use silhouette::{Agreement, agreement};
-pub use start::start_height_px;
+pub use start::{Start, start};

@@ -12,6 +12,11 @@ pub struct Report {
     /// length below it means anything.
     #[serde(default)]
     pub position_step_m: f64,
+    /// Focal length of the camera in pixels: the tree is looked at from where its height takes so
+    /// many pixels, `focal_px * height_m / height_px` metres from its middle (flat trees through a
+    /// longer lens from 1.5 radii). Absent where lines of sight are parallel.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub focal_px: Option<f64>,
     /// The original, drawn as an engine draws it: what the levels replace.
     pub original: Option<Level>,
     /// The levels, nearest first.
@@ -47,8 +52,8 @@ pub struct Level {
     /// Bytes of the file and what it refers to.
     pub file_bytes: u64,
     /// Distance from which the level is shown, metres: where the tree has the level's own height
-    /// (or, where none is known, the first size asked for) on a 1080-line screen with a vertical
-    /// field of view of 60 degrees; 0 for the original.
+    /// (or, where none is known, the first size asked for) through the report's lens; 0 for the
+    /// original.
     pub distance_m: f64,
     /// Fragments shaded (before alpha test, back faces culled) for each covered sample, mean over views.
     pub overdraw: f64,
@@ -132,8 +137,9 @@ pub struct ViewFigures {
 }
 
 /// How a level looks beside the original: lit by sky and sun, before a ground of half of white's
-/// light, with at least 16 samples a pixel (4 where the tree is higher than 256 pixels). Means of FLIP, SSIM and PSNR are over the pixels that
-/// either one touches: an empty surrounding is no merit.
+/// light, with 16 samples a pixel; where the tree is under 128 pixels high coverage has more, 512 lines
+/// of samples. Means of FLIP, SSIM and PSNR are over the pixels that either one touches: an empty
+/// surrounding is no merit.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Appearance {
     /// Harmonic mean of both below: `2 sum(min(a, b)) / (sum(a) + sum(b))` over the coverage `a` of

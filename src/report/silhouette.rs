@@ -3,7 +3,7 @@
 //! `P = tp / (tp + fp)`, `R = tp / (tp + fn)`, `F1 = 2 P R / (P + R) = 2 tp / (2 tp + fp + fn)`
 //! over pixels that are at least half covered. (The paper's third formula prints tn for fn.)
 
-use crate::space::raster::Coverage;
+use crate::space::raster::{Coverage, Mask};
 
 /// How two silhouettes agree, in pixels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -18,9 +18,14 @@ pub struct Agreement {
 
 /// Compares the half-covered pixels of an original and a level of the same size.
 pub fn agreement(original: &Coverage, level: &Coverage) -> Agreement {
-    debug_assert_eq!(original.fraction.len(), level.fraction.len());
+    agreement_of(&original.fraction, &level.fraction)
+}
+
+/// As [`agreement`], of the covered share of every pixel.
+pub(super) fn agreement_of(original: &[f32], level: &[f32]) -> Agreement {
+    debug_assert_eq!(original.len(), level.len());
     let mut sum = Agreement::default();
-    for (&original, &level) in original.fraction.iter().zip(&level.fraction) {
+    for (&original, &level) in original.iter().zip(level) {
         match (original >= 0.5, level >= 0.5) {
             (true, true) => sum.both += 1,
             (false, true) => sum.extra += 1,
@@ -29,6 +34,15 @@ pub fn agreement(original: &Coverage, level: &Coverage) -> Agreement {
         }
     }
     sum
+}
+
+/// F1 of an original moved by half a pixel against itself, to the right and down (mean of the two).
+pub(super) fn moved_f1(mask: &Mask, original: &[f32]) -> f64 {
+    // Half a pixel is a number of samples: the moved picture needs no second drawing.
+    let half = mask.side as i32 / 2;
+    let moved = [(half, 0), (0, half)]
+        .map(|(x, y)| agreement_of(original, &mask.coverage_shifted(x, y).fraction).f1());
+    0.5 * (moved[0] + moved[1])
 }
 
 impl Agreement {

@@ -20,12 +20,25 @@ fn xyz(rgb: [f32; 3]) -> [f32; 3] {
     XYZ.map(|row| row[0] * rgb[0] + row[1] * rgb[1] + row[2] * rgb[2])
 }
 
+/// Cube root of a positive number within two roundings: a guess by a third of the exponent, and
+/// two steps of Halley's method, each of which triples the digits. A call into the C library
+/// takes several times as long.
+fn cube_root(x: f32) -> f32 {
+    /// Of all numbers to start from the one that is least wrong (3 %).
+    const GUESS: u32 = 0x2a51_4067;
+    let step = |y: f32| {
+        let cube = y * y * y;
+        y * ((cube + 2.0 * x) / (2.0 * cube + x))
+    };
+    step(step(f32::from_bits(x.to_bits() / 3 + GUESS)))
+}
+
 /// CIE L*a*b* of linear RGB.
 pub fn lab(rgb: [f32; 3]) -> [f32; 3] {
     const DELTA: f32 = 6.0 / 29.0;
     let [x, y, z] = xyz(rgb).map(|t| {
         if t > DELTA * DELTA * DELTA {
-            t.cbrt()
+            cube_root(t)
         } else {
             t / (3.0 * DELTA * DELTA) + 4.0 / 29.0
         }
@@ -61,6 +74,15 @@ mod tests {
             "{:?}",
             lab([0.0, 1.0, 0.0])
         );
+    }
+
+    #[test]
+    fn cube_roots_are_those_of_the_c_library() {
+        for i in 1..100_000 {
+            let x = i as f32 * 1.3e-5;
+            let off = (cube_root(x) - x.cbrt()).abs() / x.cbrt();
+            assert!(off < 3e-7, "{x}: {off}");
+        }
     }
 
     #[test]

@@ -11,6 +11,51 @@ pub const ELEVATIONS: [f32; 3] = [0.0, 30.0, -15.0];
 /// and the top. An odd number of azimuths, since opposite views show mirrored silhouettes.
 pub const DEFAULT_VIEWS: usize = 16;
 
+/// How lines of sight run.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Lens {
+    /// In parallel: a picture without distance, as in figures of the literature.
+    Parallel,
+    /// They meet in the eye. The focal length is in pixels: what is `d` away and `h` high takes
+    /// `focal * h / d` pixels.
+    Focal(f32),
+}
+
+impl Lens {
+    /// Lines of the screen that distances are stated for.
+    pub const SCREEN_LINES: f64 = 1080.0;
+    /// Vertical field of view that distances are stated for, degrees.
+    pub const FIELD_OF_VIEW_DEG: f64 = 60.0;
+
+    /// The lens of a screen with so many lines and a vertical field of view in degrees:
+    /// `f = lines / (2 tan(fov / 2))`.
+    pub fn of_screen(lines: f64, fov_deg: f64) -> Self {
+        Self::Focal((lines / (2.0 * (fov_deg / 2.0).to_radians().tan())) as f32)
+    }
+
+    /// Focal length in pixels; `None` where lines of sight are parallel.
+    pub fn focal_px(self) -> Option<f32> {
+        match self {
+            Self::Parallel => None,
+            Self::Focal(focal_px) => Some(focal_px),
+        }
+    }
+}
+
+/// 1080 lines and 60 degrees: 935.3 pixels.
+impl Default for Lens {
+    fn default() -> Self {
+        Self::of_screen(Self::SCREEN_LINES, Self::FIELD_OF_VIEW_DEG)
+    }
+}
+
+/// The eye stays at least so far from the middle of the unit sphere, in radii. Where a flat tree
+/// would be seen from nearer, or from within, the lens is longer instead, as a photographer would do.
+const NEAREST_EYE: f32 = 1.5;
+
+/// Radius that a picture has room for: levels may reach a little beyond the original's unit sphere.
+const ROOM: f32 = 1.05;
+
 /// A direction from which a tree is looked at.
 #[derive(Clone, Debug, PartialEq)]
 pub struct View {
@@ -77,24 +122,48 @@ impl View {
     /// The picture is square and the same size for every view; where the tree has an extent
     /// along y of `height` (units of the sphere's radius), that extent is `height_px` pixels.
     pub fn camera(&self, height: f32, height_px: u32) -> Camera {
-        self.camera_in_steps(height, height_px, 1)
+        let pixels_per_unit = height_px as f32 / height;
+        let side = even_side(pixels_per_unit * ROOM);
+        let forward = -self.towards_eye();
+        Camera::orthographic(forward, self.up(), Vec3::ZERO, pixels_per_unit, side, side)
     }
 
-    /// As [`View::camera`], with sides that can be divided into `step` even parts.
-    pub fn camera_in_steps(&self, height: f32, height_px: u32, step: u32) -> Camera {
-        let pixels_per_unit = height_px as f32 / height;
-        // A margin for levels that reach a little beyond the original's sphere.
-        let side = ((pixels_per_unit * 2.1).ceil() as u32 + 4).next_multiple_of(2 * step);
-        let (sin, cos) = self.azimuth_deg.to_radians().sin_cos();
-        // Straight from above, "up" is where the view at the same azimuth looks to.
-        let up = if self.elevation_deg.abs() > 89.0 {
+    /// As [`View::camera`], through a lens: with a focal length the eye is where the tree's height
+    /// takes `height_px`, at the distance `focal * height / height_px` from the middle.
+    pub fn camera_through(&self, lens: Lens, height: f32, height_px: u32) -> Camera {
+        let flat = self.camera(height, height_px);
+        let Some(focal_px) = lens.focal_px() else {
+            return flat;
+        };
+        let distance = (focal_px / flat.pixels).max(NEAREST_EYE);
+        let focal_px = distance * flat.pixels;
+        // The sphere's rim is seen where lines of sight touch it.
+        let rim = focal_px * ROOM / (distance * distance - ROOM * ROOM).sqrt();
+        let side = even_side(rim);
+        Camera {
+            origin: self.towards_eye() * distance,
+            pixels: focal_px,
+            perspective: true,
+            width: side,
+            height: side,
+            ..flat
+        }
+    }
+
+    /// Straight from above, "up" is where the view at the same azimuth looks to.
+    fn up(&self) -> Vec3 {
+        if self.elevation_deg.abs() > 89.0 {
+            let (sin, cos) = self.azimuth_deg.to_radians().sin_cos();
             Vec3::new(-sin, 0.0, -cos)
         } else {
             Vec3::Y
-        };
-        let forward = -self.towards_eye();
-        Camera::orthographic(forward, up, Vec3::ZERO, pixels_per_unit, side, side)
+        }
     }
+}
+
+/// Side of a picture in pixels with room for so much around its middle, which is a pixel's corner.
+fn even_side(half: f32) -> u32 {
+    ((2.0 * half).ceil() as u32 + 4).next_multiple_of(2)
 }
 
 #[cfg(test)]
@@ -125,5 +194,40 @@ mod tests {
             assert_eq!(camera.pixels, 256.0 / 1.4);
             assert!(camera.width as f32 > 2.0 * camera.pixels);
         }
+    }
+
+    #[test]
+    fn a_lens_shows_the_height_at_the_distance_that_levels_state() {
+        // 1080 lines, 60 degrees: f = 1080 / (2 tan 30 degrees) = 935.3.
+        let focal_px = Lens::default().focal_px().unwrap();
+        assert!((focal_px - 935.307).abs() < 1e-3, "{focal_px}");
+        for (height, height_px) in [(1.4, 512), (1.4, 64), (1.9, 32)] {
+            for view in views(16, 11.0) {
+                let camera = view.camera_through(Lens::default(), height, height_px);
+                let distance = camera.origin.length();
+                assert!((distance - focal_px * height / height_px as f32).abs() < 1e-4);
+                // What is as far as the middle and as high as the tree takes its height in pixels.
+                let top = camera.on_picture(camera.up * height).unwrap();
+                assert!((top.y + height_px as f32).abs() < 1e-2, "{top}");
+                // The whole sphere is in the picture, whatever side its rim is on.
+                for i in 0..64 {
+                    let angle = i as f32 / 64.0 * std::f32::consts::TAU;
+                    let rim = (1.0 / distance).acos();
+                    let out = camera.right * angle.cos() + camera.up * angle.sin();
+                    let p = -camera.forward * rim.cos() + out * rim.sin();
+                    let at = camera.on_picture(p).unwrap();
+                    assert!(at.abs().max_element() < camera.width as f32 / 2.0);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn nobody_looks_at_a_flat_tree_from_within_it() {
+        let view = &views(1, 0.0)[0];
+        let camera = view.camera_through(Lens::default(), 0.2, 512);
+        assert_eq!(camera.origin.length(), 1.5);
+        let top = camera.on_picture(camera.up * 0.2).unwrap();
+        assert!((top.y + 512.0).abs() < 1e-2);
     }
 }

@@ -19,7 +19,7 @@ use self::plot::{Plot, Series, mark};
 use super::schema::{Level, Report};
 use crate::Result;
 use crate::botany::Model;
-use crate::space::view::View;
+use crate::space::view::{Lens, View};
 
 const STYLE: &str = include_str!("style.css");
 const SCRIPT: &str = include_str!("script.js");
@@ -34,6 +34,8 @@ pub struct Content<'a> {
     pub levels: &'a [&'a Model],
     /// The views that the figures are of.
     pub views: &'a [View],
+    /// Through what.
+    pub lens: Lens,
     /// How the levels were made, where a bake tells.
     pub made: Option<Made<'a>>,
 }
@@ -148,7 +150,7 @@ impl Content<'_> {
         let shown = self.shown(row);
         let pairs: Vec<Pair> = shown
             .par_iter()
-            .map(|view| pair(self.original, model, view, height_px))
+            .map(|view| pair(self.original, model, view, (self.lens, height_px)))
             .collect::<Result<_>>()?;
         let title = format!("level-{}", row.level);
         Ok(html! {

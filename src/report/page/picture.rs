@@ -2,9 +2,8 @@
 
 use crate::botany::Model;
 use crate::report::shot::Shot;
-use crate::report::stage::{Actor, Window};
-use crate::space::raster::Sampling;
-use crate::space::view::View;
+use crate::report::stage::{Actor, Window, sampling};
+use crate::space::view::{Lens, View};
 use crate::{Error, Result};
 
 /// A level beside its original from one view, as PNG files of one size.
@@ -34,12 +33,20 @@ pub const AGREEMENT: [[u8; 3]; 4] = [[255, 255, 255], [208, 208, 208], [128, 128
 ///
 /// # Errors
 /// [`Error::Internal`] if a picture can't be encoded.
-pub fn pair(original: &Model, level: &Model, view: &View, height_px: u32) -> Result<Pair> {
-    let actors = [original, level].map(|model| Actor::new(model, original));
-    let height = original.height();
-    let window = Window::around(&actors, &[view], height, height_px, 1);
-    let camera = window.camera(view, height, height_px);
-    let [a, b] = actors.map(|a| Shot::new(a.layers(&camera, Sampling::REFERENCE)));
+pub fn pair(
+    original: &Model,
+    level: &Model,
+    view: &View,
+    (lens, height_px): (Lens, u32),
+) -> Result<Pair> {
+    let actors = [original, level].map(|model| Actor::new(model, original, true));
+    let lens = (lens, original.height());
+    let (window, camera) = Window::of_view(&actors, view, lens, height_px);
+    let drawn = |actor: Actor| {
+        let order = actor.front_to_back(camera.forward);
+        Shot::new(actor.layers(&camera, sampling(height_px), &order).1)
+    };
+    let [a, b] = actors.map(drawn);
     let agreement: Vec<u8> = a
         .layers
         .coverage

@@ -110,6 +110,28 @@ impl Camera {
         }
     }
 
+    /// Where a point of the space that is looked at lies in the picture, in pixels to the right of
+    /// and below what `origin` or the line of sight through it shows, before any shift; `None`
+    /// behind the eye.
+    pub fn on_picture(&self, point: Vec3) -> Option<Vec2> {
+        let p = point - self.origin;
+        let magnify = match self.perspective {
+            true => self.pixels / Some(p.dot(self.forward)).filter(|&z| z >= NEAR)?,
+            false => self.pixels,
+        };
+        Some(Vec2::new(p.dot(self.right), -p.dot(self.up)) * magnify)
+    }
+
+    /// Length along the line of sight through a place of the picture (pixels from the middle) for
+    /// a unit of length along `forward`.
+    pub(super) fn slant(&self, place: Vec2) -> f32 {
+        if self.perspective {
+            (1.0 + place.length_squared() / (self.pixels * self.pixels)).sqrt()
+        } else {
+            1.0
+        }
+    }
+
     /// Projects model-space points to a grid of `side` samples a pixel.
     pub(super) fn project(&self, points: &[Vec3], side: u32) -> Vec<Corner> {
         let scale = side as f32 * SUBSAMPLES as f32;

@@ -2,6 +2,7 @@
 
 use super::row::is_all;
 use super::seen::seen;
+use super::tiles::Tiles;
 use super::triangle::CENTER;
 use super::{Camera, Mips, Sampling, Scene};
 
@@ -78,7 +79,17 @@ impl Mask {
         let (width, height) = ((self.width * side) as i32, (self.height * side) as i32);
         let samples = &mut self.samples;
         let mut fragments = 0;
+        let mut tiles = Tiles::new(width, height);
+        // Whatever is there hides all the rest.
+        let least = |samples: &[u8]| match samples.contains(&0) {
+            true => f32::NEG_INFINITY,
+            false => f32::INFINITY,
+        };
         for shown in seen(scene, &corners, CENTER) {
+            // What lies in full tiles alone is not even scanned.
+            if !COUNTED && tiles.hide(&shown.corners, 0.0, |range| least(&samples[range])) {
+                continue;
+            }
             let mut fragment = None;
             shown.triangle.rows(width, height, CENTER, |y, row| {
                 let first = y as usize * width as usize;

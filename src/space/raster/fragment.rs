@@ -1,6 +1,7 @@
 //! What the material of one triangle gives at its samples: alpha test and base colour.
 
 use super::camera::Corner;
+use super::piece::Piece;
 use super::row::TexelRow;
 use super::texture::{Address, Texture, UNIT};
 use super::triangle::{Plane, Triangle};
@@ -13,11 +14,18 @@ pub(super) struct Fragment<'a> {
     u: Plane,
     v: Plane,
     q: Plane,
-    /// The level of the whole triangle, where lines of sight are parallel.
+    /// The level of the whole triangle, where lines of sight are parallel or as good as that.
     lod: Option<f32>,
     mips: Mips,
     /// Vertex alpha, where vertices have colours.
     alpha: Option<Plane>,
+}
+
+/// Whether a triangle is so small against its distance that one level of its texture is right for
+/// all of it, within .02 levels: such a triangle's corners are `1 / q` away.
+fn is_far(q: [f32; 3]) -> bool {
+    let (low, high) = (q[0].min(q[1]).min(q[2]), q[0].max(q[1]).max(q[2]));
+    high - low < low / 64.0
 }
 
 impl<'a> Fragment<'a> {
@@ -34,7 +42,11 @@ impl<'a> Fragment<'a> {
             .texture
             .filter(|_| !uvs.is_empty())
             .map(|i| &scene.textures[i as usize]);
-        let q = corners.map(|c| c.q);
+        // A face that is as far everywhere is as flat as one that parallel lines of sight meet.
+        let q = match corners.map(|c| c.q) {
+            [a, b, c] if a == b && b == c => [1.0; 3],
+            q => q,
+        };
         let flat = q == [1.0; 3];
         let mut fragment = Self {
             texture,
@@ -52,6 +64,11 @@ impl<'a> Fragment<'a> {
             fragment.v = triangle.plane(std::array::from_fn(|i| uv[i].y * q[i]));
             if flat || sampling.mips == Mips::Base {
                 fragment.lod = Some(fragment.level(0.0, 0.0, 1.0));
+            } else if is_far(q) {
+                let middle = |values: [f32; 3]| values.iter().sum::<f32>() / 3.0;
+                let q = middle(q);
+                let [u, v] = [uv.map(|uv| uv.x), uv.map(|uv| uv.y)].map(middle);
+                fragment.lod = Some(fragment.level(u, v, q));
             }
         }
         let colors = scene.geometry.colors;
@@ -143,6 +160,26 @@ impl<'a> Fragment<'a> {
                 for (sample, x) in samples.iter_mut().zip(from..).filter(|(s, _)| **s == 0) {
                     let alpha = mip.alpha([u.value(x), v.value(x)], address);
                     *sample = (factor * alpha >= cutoff) as u8;
+                }
+            }
+            (Some(texture), Some(lod), Some(cutoff))
+                if self.alpha.is_none() && texture.mip(lod).is_single() =>
+            {
+                let (level, address) = (texture.mip(lod).level(), self.address());
+                let rows = [self.u.row(y), self.v.row(y), self.q.row(y)];
+                let factor = self.material.factor[3];
+                let (mut from, mut rest) = (from, samples);
+                while !rest.is_empty() {
+                    let Piece { length, u, v } = Piece::new(rows, from, rest.len());
+                    let (piece, after) = rest.split_at_mut(length);
+                    let row = TexelRow {
+                        level,
+                        u,
+                        v,
+                        address,
+                    };
+                    row.test(from, piece, |alpha| factor * (alpha * UNIT) >= cutoff);
+                    (from, rest) = (from + length as i32, after);
                 }
             }
             _ => {

@@ -25,11 +25,13 @@ mod image;
 mod layers;
 mod mips;
 mod msaa;
+mod piece;
 mod relief;
 mod row;
 mod seen;
 mod shade;
 mod texture;
+mod tiles;
 mod triangle;
 
 pub use camera::{Camera, Placement};

@@ -5,7 +5,7 @@ use pleach::botany::Model;
 use pleach::botany::model::{AlphaMode, Frame, Image, Material, Object, TextureRef, Wrap};
 use pleach::report::{Drawable, Reference, Settings, evaluate};
 use pleach::space::raster::{Sampling, coverage};
-use pleach::space::view::views;
+use pleach::space::view::{Lens, views};
 
 /// A crown of quads, scattered by a fixed sequence; every `keep`-th one is left out if `keep > 0`.
 fn crown(quads: u32, leave_out: u32) -> Model {
@@ -53,7 +53,7 @@ fn quad(model: &mut Model, center: Vec3, u: Vec3, v: Vec3) {
 fn the_original_has_no_error_and_an_empty_level_all_of_it() {
     let original = crown(600, 0);
     let reference = Reference::new(&original, &views(16, 0.0), 128);
-    let own = reference.compare(&original, Sampling::REFERENCE);
+    let own = reference.compare(&original);
     assert_eq!(
         (own.f1.worst, own.shift_ratio, own.area_ratio.worst),
         (1.0, 0.0, 1.0)
@@ -62,7 +62,7 @@ fn the_original_has_no_error_and_an_empty_level_all_of_it() {
         materials: original.materials.clone(),
         ..Model::default()
     };
-    let none = reference.compare(&empty, Sampling::REFERENCE);
+    let none = reference.compare(&empty);
     assert_eq!((none.f1.mean, none.recall.mean), (0.0, 0.0));
     assert!(none.area_ratio.mean < 1e-4);
 }
@@ -76,7 +76,7 @@ fn the_original_moved_by_half_a_pixel_has_a_shift_ratio_of_one() {
     let drawable = Drawable::silhouette(&original);
     let mut sum = 0.0;
     for view in &set {
-        let camera = view.camera(original.height(), 128);
+        let camera = view.camera_through(Lens::default(), original.height(), 128);
         let draw = |c| coverage(&drawable.scene(), &c, Sampling::REFERENCE).coverage();
         let still = draw(camera);
         for (x, y) in [(0.5, 0.0), (0.0, 0.5)] {
@@ -94,8 +94,7 @@ fn the_original_moved_by_half_a_pixel_has_a_shift_ratio_of_one() {
 fn leaving_out_leaves_costs_recall_alone() {
     let original = crown(600, 0);
     let level = crown(600, 5);
-    let figures =
-        Reference::new(&original, &views(16, 0.0), 128).compare(&level, Sampling::REFERENCE);
+    let figures = Reference::new(&original, &views(16, 0.0), 128).compare(&level);
     assert_eq!(figures.precision.worst, 1.0);
     assert!(
         figures.recall.mean < 0.98 && figures.recall.mean > 0.9,
@@ -123,8 +122,7 @@ fn a_file_with_another_frame_is_put_in_its_place() {
     for p in &mut level.positions {
         *p = (*p * 8.0 - Vec3::new(0.8, -0.4, 0.2)) / 10.0;
     }
-    let figures =
-        Reference::new(&original, &views(16, 0.0), 128).compare(&level, Sampling::REFERENCE);
+    let figures = Reference::new(&original, &views(16, 0.0), 128).compare(&level);
     // Rounding may move a corner over a sample.
     assert!(figures.f1.worst > 0.999, "{:?}", figures.f1);
 }
@@ -171,6 +169,7 @@ fn threads_do_not_change_a_figure() {
     let (original, level) = (crown(500, 0), crown(500, 7));
     let settings = Settings {
         client: true,
+        appearance: true,
         ..Settings::default()
     };
     let run = |threads| {
@@ -249,6 +248,52 @@ fn the_original_itself_looks_like_the_original_and_moves_like_it() {
     assert!(thin.jump_to_next.is_none());
 }
 
+/// A wall seen from the front, half a tree height behind where it should be: through a lens it is
+/// smaller by what it is farther, and its middle is off by just that in depth.
+#[test]
+fn what_stands_back_is_smaller_through_a_lens_and_not_along_parallel_lines() {
+    let mut wall = Model {
+        materials: vec![Material {
+            double_sided: true,
+            ..Material::default()
+        }],
+        objects: vec![Object::default()],
+        ..Model::default()
+    };
+    quad(&mut wall, Vec3::ZERO, Vec3::X * 0.5, Vec3::Y * 0.5);
+    let mut behind = wall.clone();
+    behind.positions.iter_mut().for_each(|p| p.z -= 0.5);
+    let run = |lens| {
+        let settings = Settings {
+            heights_px: vec![256],
+            views: 2,
+            elevations_deg: vec![0.0],
+            appearance: true,
+            lens,
+            ..Settings::default()
+        };
+        let report = evaluate((&wall, "a"), &[(&behind, "b")], &settings);
+        let size = report.levels[0].sizes[0].clone();
+        let front = size.appearance.unwrap().views[0].clone();
+        assert_eq!(front.view, "azimuth 0 elevation 0");
+        (
+            report.focal_px,
+            size.views[0].area_ratio,
+            front.depth_error.unwrap(),
+        )
+    };
+    let (focal_px, area, depth) = run(Lens::Parallel);
+    assert_eq!((focal_px, area), (None, 1.0));
+    assert!((depth - 0.5).abs() < 1e-3, "{depth}");
+    // One high and 256 pixels: seen from 935.3 / 256 = 3.654, and then from half more.
+    let (focal_px, area, depth) = run(Lens::default());
+    let distance = focal_px.unwrap() / 256.0;
+    let smaller = (distance / (distance + 0.5)).powi(2);
+    assert!((area - smaller).abs() < 0.005, "{area} against {smaller}");
+    // Along lines of sight, which lean by up to 8 degrees here.
+    assert!((0.5..0.505).contains(&depth), "{depth}");
+}
+
 /// Both halves of a wall turned by a normal map: the light on them tells which way it turns.
 #[test]
 fn a_normal_map_turns_the_surface_it_is_on() {
@@ -303,7 +348,7 @@ fn the_client_is_what_three_js_shows() {
     let oak = pleach::botany::load::load(&file).unwrap();
     let drawable = Drawable::silhouette(&oak);
     for (height_px, f1, area) in [(256, 0.9681, 0.9732), (128, 0.9219, 0.8899)] {
-        let reference = Reference::of(&drawable, &oak, &views(10, 11.0), height_px);
+        let reference = Reference::of(&drawable, &oak, &views(10, 11.0), Lens::Parallel, height_px);
         let client = reference.compare_client(&drawable);
         assert!(
             (client.f1.mean - f1).abs() < 0.003,
@@ -315,128 +360,5 @@ fn the_client_is_what_three_js_shows() {
             "{height_px}: {:?}",
             client.area_ratio
         );
-    }
-}
-
-/// Runs `pleach evaluate` with these arguments.
-fn evaluate_command(arguments: &[&str]) -> std::process::Output {
-    std::process::Command::new(env!("CARGO_BIN_EXE_pleach"))
-        .arg("evaluate")
-        .args(arguments)
-        .output()
-        .unwrap()
-}
-
-#[test]
-fn the_command_prints_the_report_and_writes_it_with_pictures() {
-    let oak = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/oak.glb");
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("new/folder");
-    let level = format!("{oak}@32");
-    let arguments = [
-        oak,
-        &level,
-        "--json",
-        "--client",
-        "--height",
-        "64",
-        "--views",
-        "4",
-        "--elevations",
-        "0,30,-15",
-        "-o",
-    ];
-    let done = evaluate_command(&[&arguments[..], &[out.to_str().unwrap()]].concat());
-    assert!(
-        done.status.success(),
-        "{}",
-        String::from_utf8_lossy(&done.stderr)
-    );
-    let report: pleach::report::schema::Report = serde_json::from_slice(&done.stdout).unwrap();
-    let sizes = &report.levels[0].sizes;
-    assert_eq!(
-        sizes.iter().map(|s| s.height_px).collect::<Vec<_>>(),
-        [64, 32, 16]
-    );
-    assert!(
-        sizes
-            .iter()
-            .all(|s| s.f1.mean == 1.0 && s.client.is_some() && s.views.len() == 4)
-    );
-    let written = std::fs::read(out.join("report.json")).unwrap();
-    assert_eq!(written, done.stdout);
-    for picture in ["contact.png", "contact-client.png"] {
-        let sheet = image::open(out.join(picture)).unwrap().to_rgb8();
-        let tree = sheet.pixels().filter(|p| p.0 != [255; 3]).count();
-        assert!(tree > 1000, "{picture}: {tree} pixels");
-    }
-}
-
-/// One file that asks for nothing else, with pictures for every level and each of them named.
-#[test]
-fn the_page_holds_everything_itself() {
-    let oak = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/oak.glb");
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().to_str().unwrap();
-    let (near, far) = (format!("{oak}@48"), format!("{oak}@24"));
-    let done = evaluate_command(&[
-        oak,
-        &near,
-        &far,
-        "--height",
-        "32",
-        "--views",
-        "3",
-        "--elevations",
-        "0",
-        "-o",
-        out,
-    ]);
-    assert!(
-        done.status.success(),
-        "{}",
-        String::from_utf8_lossy(&done.stderr)
-    );
-    let text = String::from_utf8(done.stdout).unwrap();
-    assert!(
-        text.contains("FLIP") && text.contains("turned by 1 degree"),
-        "{text}"
-    );
-    let page = std::fs::read_to_string(folder.path().join("report.html")).unwrap();
-    for wanted in [
-        "<html lang=\"en\">",
-        "id=\"level-2\"",
-        "Precision and recall",
-        "prefers-color-scheme",
-    ] {
-        assert!(page.contains(wanted), "{wanted}");
-    }
-    for foreign in ["http:", "https:", "@import", "src=\"/"] {
-        assert!(!page.contains(foreign), "{foreign}");
-    }
-    let pictures = page.matches("<img").count();
-    assert_eq!(
-        pictures,
-        page.matches("src=\"data:image/png;base64,").count()
-    );
-    assert_eq!(pictures, page.matches(" alt=\"").count());
-    // For each level: two pictures twice, two maps, and the images of its file.
-    assert!(pictures >= 2 * 7, "{pictures}");
-}
-
-#[test]
-fn the_command_refuses_what_it_cannot_read_or_measure() {
-    let oak = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/oak.glb");
-    for wrong in [
-        &[oak][..],
-        &[oak, "no-such-file.glb"],
-        &[oak, oak, "--height", "0"],
-        &[oak, oak, "--height", "64,-3"],
-        &[oak, oak, "--views", "0"],
-        &[oak, oak, "--elevations", "90"],
-    ] {
-        let done = evaluate_command(wrong);
-        assert_eq!(done.status.code(), Some(2), "{wrong:?}");
-        assert!(!done.stderr.is_empty());
     }
 }

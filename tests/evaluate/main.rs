@@ -1,0 +1,4 @@
+//! Levels against their original: figures whose answers are known, and the command.
+
+mod command;
+mod figures;
