@@ -79,28 +79,33 @@ function withoutMips(scene) {
   }
 }
 
-/** Pixels of a square picture in which `box` is `heightPx` high and fits from every side. */
-function side(box, heightPx) {
-  const scale = heightPx / (box.max.y - box.min.y);
-  return 2 * Math.ceil((box.getSize(new THREE.Vector3()).length() * scale) / 2) + 4;
-}
+/** The eye stays at least so many radii away; where it would come nearer the lens is longer: as in `View::camera_through`. */
+const NEAREST_EYE = 1.5;
 
-/** A camera for which `box` is `heightPx` high; `fov` in degrees across the picture, 0 for parallel rays. */
-function camera(box, heightPx, { azimuth, elevation }, fov) {
-  const metres = (side(box, heightPx) * (box.max.y - box.min.y)) / heightPx;
+/**
+ * A camera for which `box` is `heightPx` high at its middle, and the side in pixels of a square picture in which it fits
+ * from every side. `focal` is the focal length in pixels, 0 for parallel rays; the eye is where the height takes
+ * `heightPx` through that lens.
+ */
+function camera(box, heightPx, { azimuth, elevation }, focal) {
+  const radius = box.getSize(new THREE.Vector3()).length() / 2;
+  const perMetre = heightPx / (box.max.y - box.min.y);
   const centre = box.getCenter(new THREE.Vector3());
-  const distance = fov > 0 ? metres / 2 / Math.tan(THREE.MathUtils.degToRad(fov / 2)) : 2 * metres;
-  const [near, far] = [Math.max(distance - metres, distance / 100), distance + metres];
-  const half = metres / 2;
-  const eye = fov > 0
-    ? new THREE.PerspectiveCamera(fov, 1, near, far)
-    : new THREE.OrthographicCamera(-half, half, half, -half, near, far);
+  const distance = focal > 0 ? Math.max(focal / perMetre, NEAREST_EYE * radius) : 4 * radius;
+  // Lines of sight that touch the sphere around the tree.
+  const half = focal > 0 ? (distance * perMetre * radius) / Math.sqrt(distance ** 2 - radius ** 2) : radius * perMetre;
+  const side = 2 * Math.ceil(half) + 4;
+  const [near, far] = [distance - 1.02 * radius, distance + 1.02 * radius];
+  const metres = side / perMetre / 2;
+  const eye = focal > 0
+    ? new THREE.PerspectiveCamera(THREE.MathUtils.radToDeg(2 * Math.atan(metres / distance)), 1, near, far)
+    : new THREE.OrthographicCamera(-metres, metres, metres, -metres, near, far);
   const [a, e] = [THREE.MathUtils.degToRad(azimuth), THREE.MathUtils.degToRad(elevation)];
   const towards = new THREE.Vector3(Math.cos(e) * Math.sin(a), Math.sin(e), Math.cos(e) * Math.cos(a));
   if (Math.abs(elevation) > 89.9) eye.up.set(-Math.sin(a), 0, -Math.cos(a));
   eye.position.copy(centre).addScaledVector(towards, distance);
   eye.lookAt(centre);
-  return eye;
+  return { eye, side };
 }
 
 /** One frame, read back from the canvas with its rows from the top down. */
@@ -135,7 +140,7 @@ const references = new Map();
  * Draws one file from all views at each height. The first file is the original: it sets the frame and the reference
  * that all are measured against. Returns, for each height and mode, one row of figures a view.
  */
-window.measureFile = async ({ url, label, modes, heights, views, shown, fov }) => {
+window.measureFile = async ({ url, label, modes, heights, views, shown, focal }) => {
   const tree = await load(url);
   if (!original) original = { box: tree.box };
   const results = [];
@@ -144,9 +149,8 @@ window.measureFile = async ({ url, label, modes, heights, views, shown, fov }) =
     const light = mode === 'unlit' ? withoutLight(tree.scene) : () => {};
     for (const height of heights) {
       const factor = mode === 'reference' ? SUPERSAMPLE : 1;
-      const pixels = side(original.box, height);
       const rows = views.map((view, index) => {
-        const eye = camera(original.box, height, view, fov);
+        const { eye, side: pixels } = camera(original.box, height, view, focal);
         const picture = boxDown(frame(renderers[mode === 'reference' ? mode : 'client'], tree.scene, eye, pixels * factor), factor);
         if (shown.includes(index) && mode !== 'unlit') keep(height, `${label}, ${mode}`, picture);
         return { view, measured: measure(picture) };

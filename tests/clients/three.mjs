@@ -2,11 +2,13 @@
 // supersampled original.
 //
 //   node three.mjs ORIGINAL.glb [LEVEL.glb[@HEIGHT[,HEIGHT...]]]... [--package DIR] [-o DIR] [--height PX,...]
-//                  [--views A/E,...] [--around N] [--offset DEGREES] [--fov DEGREES] [--supersampled] [--targets]
+//                  [--views A/E,...] [--around N] [--offset DEGREES] [--focal PX] [--supersampled] [--targets]
 //                  [--agree REPORT.json]
 //
 // HEIGHT is the tree's height in pixels (default 256). --package adds all levels of a bake, each where its report.json
 // measured it, its own height, and at half of that, which is twice the distance.
+// --focal is the lens, as the focal length in pixels: the eye is where the tree takes its height through it. Default is that
+// of the report that --agree names, else 1080 lines and 60 degrees (935.3); 0 is for parallel rays.
 // --agree holds our own raster to three.js: REPORT.json is what `pleach evaluate --client -o` wrote of the same files at
 // the same heights and views (`--views 3N+1 --elevations 0,30,-15 --azimuth-offset DEGREES` for `--around N --offset
 // DEGREES`); precision and recall have to agree within 0.02, mean base colours, drawn without light, within 2 % of their
@@ -41,7 +43,7 @@ const { values: options, positionals } = parseArgs({
     views: { type: 'string' },
     around: { type: 'string', default: '5' },
     offset: { type: 'string', default: '0' },
-    fov: { type: 'string', default: '0' },
+    focal: { type: 'string' },
     supersampled: { type: 'boolean', default: false },
     targets: { type: 'boolean', default: false },
     agree: { type: 'string' },
@@ -52,6 +54,9 @@ if (positionals.length === 0) {
   process.exit(2);
 }
 
+const ours = options.agree && JSON.parse(readFileSync(options.agree, 'utf8'));
+const USUAL_FOCAL = 1080 / (2 * Math.tan(Math.PI / 6));
+const focal = Number(options.focal ?? (ours ? (ours.focal_px ?? 0) : USUAL_FOCAL));
 const supersampled = options.supersampled || options.targets;
 const numbers = (text) => text.split(',').map(Number);
 const files = positionals.map((argument) => {
@@ -74,7 +79,7 @@ const report = await withPage('three.html', files.map((f) => f.file), async (pag
   const about = await page.evaluate('about()');
   const levels = [];
   for (const [index, { file, heights }] of files.entries()) {
-    const job = { url: `/file/${index}`, label: basename(file), modes: ['client', options.agree && 'unlit', (index === 0 || supersampled) && 'reference'].filter(Boolean), heights, views, shown, fov: Number(options.fov) };
+    const job = { url: `/file/${index}`, label: basename(file), modes: ['client', options.agree && 'unlit', (index === 0 || supersampled) && 'reference'].filter(Boolean), heights, views, shown, focal };
     const measured = await page.evaluate((j) => window.measureFile(j), job);
     levels.push({ file, original: index === 0, ...measured });
   }
@@ -118,11 +123,11 @@ for (const level of report.levels) {
     if (result.f1.mean < own - TARGET_F1_LOSS) faults.push(`${where}: F1 ${result.f1.mean.toFixed(3)}, supersampled ${own.toFixed(3)}`);
   }
 }
-if (options.agree) faults.push(...disagreements(JSON.parse(readFileSync(options.agree, 'utf8'))));
+if (ours) faults.push(...disagreements());
 report.faults = faults;
 
 /** Where our raster, as a client, is too far from three.js; says what it compared. */
-function disagreements(ours) {
+function disagreements() {
   const found = [];
   let count = 0;
   for (const level of report.levels) {
