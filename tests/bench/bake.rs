@@ -2,10 +2,12 @@
 //!
 //! `cargo bench --bench bake` prints a table of stages for a tree of 500,000 triangles and its
 //! ratio to the limit (load it, draw every triangle once into 2048 x 2048, encode the same
-//! textures), then times bakes of 10k, 100k and 1M leaves with divan.
+//! textures), the time of the default evaluation of its levels, also as a ratio to the bake's, then
+//! times bakes of 10k, 100k and 1M leaves with divan.
 //! `PLEACH_BENCH_TREE=file.glb` takes another tree for the table.
 
 use std::path::{Path, PathBuf};
+use std::process::Command;
 use std::time::Instant;
 
 use pleach::botany::grow::{Options, Species, grow};
@@ -86,7 +88,26 @@ fn stages() {
         println!("limit: {name:9} {seconds:7.2}");
     }
     let least: f64 = limit.iter().map(|l| l.1).sum();
-    println!("bake over limit  {:7.2}\n", all / least);
+    println!("bake over limit  {:7.2}", all / least);
+    let evaluation = evaluation(&input, &output, &baked);
+    println!("evaluation       {evaluation:7.2}");
+    println!("over the bake    {:7.2}\n", evaluation / all);
+}
+
+/// Seconds that the default evaluation of the baked levels takes, page and pictures included.
+fn evaluation(input: &Path, output: &Path, baked: &Baked) -> f64 {
+    let levels = baked.report.levels.iter().map(|l| output.join(&l.file));
+    let start = Instant::now();
+    let done = Command::new(env!("CARGO_BIN_EXE_pleach"))
+        .arg("evaluate")
+        .arg(input)
+        .args(levels)
+        .arg("-o")
+        .arg(output.with_extension("evaluated"))
+        .output()
+        .expect("the command");
+    assert!(done.status.success());
+    start.elapsed().as_secs_f64()
 }
 
 /// What any such bake has to do at least, timed in this run.
