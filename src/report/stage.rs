@@ -11,7 +11,7 @@ use crate::space::raster::{
 use crate::space::view::{Lens, View};
 
 /// Lines of samples that a tree is drawn with at least: in fewer, where a silhouette is half of a
-/// pixel depends on where the samples happen to lie (level 1 of an airy birch at 32 pixels: F1 .90
+/// pixel depends on where the samples happen to lie (level 1 of an airy birch at 32 pixels: F1 .91
 /// with 16 samples a pixel, .97 with 1,024).
 const LEAST_SAMPLES: u32 = 512;
 
