@@ -107,6 +107,12 @@ impl Reference {
         })
     }
 
+    /// Compares what `draw` shows through each picture's camera: what no scene can hold, such as an
+    /// impostor whose shader looks where the eye is.
+    pub fn compare_drawn(&self, draw: impl Fn(&Camera) -> Coverage + Sync) -> SizeFigures {
+        self.compare_pictures(|picture| draw(&picture.camera))
+    }
+
     fn compare_pictures(&self, draw: impl Fn(&Picture) -> Coverage + Sync) -> SizeFigures {
         let outline = |picture: &Picture| {
             let level = draw(picture);
