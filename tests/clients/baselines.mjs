@@ -9,13 +9,7 @@ import { execFileSync } from 'node:child_process';
 import { mkdirSync, writeFileSync } from 'node:fs';
 import { basename, join } from 'node:path';
 import { parseArgs } from 'node:util';
-import { readGlbJson, trianglesInScene } from './glb.mjs';
-
-const GLTFPACK = new URL('node_modules/gltfpack/cli.js', import.meta.url).pathname;
-const METHODS = { 'gltfpack -se 1': ['-se', '1'], 'gltfpack -sa': ['-sa'] };
-/** gltfpack misses the ratio it is asked for: search until the count is this near. */
-const NEAR_ENOUGH = 0.01;
-const MOST_TRIES = 10;
+import { METHODS, NEAR_ENOUGH, simplified, triangles } from './gltfpack.mjs';
 
 const { values: options, positionals } = parseArgs({
   allowPositionals: true,
@@ -30,31 +24,6 @@ if (levels.length === 0 || !options.out) {
   console.error('usage: node baselines.mjs PLEACH ORIGINAL.glb LEVEL.glb... -o DIR');
   process.exit(2);
 }
-const triangles = (file) => trianglesInScene(readGlbJson(file));
-
-/** The file nearest to `wanted` triangles that gltfpack makes by `flags`, from above where it can choose. */
-function simplified(wanted, flags, file) {
-  const make = (ratio) => {
-    execFileSync(process.execPath, [GLTFPACK, '-i', original, '-o', file, '-noq', '-si', ratio.toFixed(6), ...flags], {
-      stdio: ['ignore', 'ignore', 'inherit'],
-    });
-    return triangles(file);
-  };
-  let [low, high] = [0, 1];
-  let ratio = Math.min(1, wanted / triangles(original));
-  let best;
-  for (let i = 0; i < MOST_TRIES; i++) {
-    const count = make(ratio);
-    const off = Math.abs(count / wanted - 1);
-    if (!best || off < best.off) best = { ratio, off };
-    if (off <= NEAR_ENOUGH) return count;
-    if (count > wanted) high = ratio;
-    else low = ratio;
-    const next = i === 0 ? Math.min(high, Math.max(low, (ratio * wanted) / Math.max(count, 1))) : (low + high) / 2;
-    ratio = next > low && next < high ? next : (low + high) / 2;
-  }
-  return make(best.ratio);
-}
 
 mkdirSync(options.out, { recursive: true });
 /** What is to be measured: for each level itself, then its baselines. */
@@ -64,7 +33,7 @@ levels.forEach((file, index) => {
   entries.push({ group: index, label: 'pleach', file });
   for (const [label, flags] of Object.entries(METHODS)) {
     const made = join(options.out, `${basename(original, '.glb')}_${index}_${label.replace(/\W+/g, '_')}.glb`);
-    simplified(wanted, flags, made);
+    simplified(original, wanted, flags, made);
     entries.push({ group: index, label, file: made });
   }
 });
