@@ -12,6 +12,7 @@ mod progress;
 mod scene;
 mod study;
 mod sweep;
+mod sweep_table;
 
 use std::ffi::OsString;
 use std::process::ExitCode;

@@ -1,4 +1,4 @@
-//! `pleach sweep`: what speed costs in accuracy, on the user's own tree.
+//! `pleach sweep`: what speed costs in accuracy, on the user's own trees.
 
 use std::path::{Path, PathBuf};
 
@@ -6,16 +6,19 @@ use super::bake::limit;
 use super::out::print;
 use super::progress::{Bars, catch_ctrl_c};
 use super::scene::scene;
+use super::sweep_table::{table, table_of_all};
 use crate::error::{Error, Result};
 use crate::pipeline::{Limit, Wanted};
-use crate::sweep::{Asked, Sweep, plot, sweep};
+use crate::sweep::{Asked, Sweep, plot, sweep, whole};
 use crate::threads::pool;
 
 /// Measure speed against accuracy: every preset, and each knob alone.
 #[derive(clap::Args, Debug)]
 pub struct Args {
-    /// The tree: .glb or .gltf.
-    input: PathBuf,
+    /// The trees: .glb or .gltf. Of several, each has a folder of its name under DIR, and DIR holds
+    /// what they come to together.
+    #[arg(required = true, value_name = "INPUT")]
+    inputs: Vec<PathBuf>,
     /// Folder for sweep.json, sweep.csv and sweep.svg.
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
@@ -42,17 +45,24 @@ pub struct Args {
 /// Runs the command.
 pub fn run(args: &Args) -> Result<()> {
     let asked = Asked {
-        input: args.input.clone(),
+        inputs: args.inputs.clone(),
         wanted: Wanted::Limits(args.triangles.clone()),
         scene: scene(args.scene.as_deref())?,
         only: args.only.clone(),
     };
+    let folders = folders(&args.inputs, &args.output)?;
     catch_ctrl_c()?;
     std::fs::create_dir_all(&args.output).map_err(|e| Error::io(&args.output, "create", e))?;
     let pool = pool(args.threads.into())?;
     let scratch = args.output.join(format!(".sweep-{}", std::process::id()));
     let bars = Bars::new(args.quiet);
-    let found = pool.install(|| sweep(&asked, &scratch, &bars));
+    let mut left = folders.iter();
+    // Written tree by tree: what was measured stays, whatever becomes of the next.
+    let write_one = |sweep: &Sweep| {
+        left.next()
+            .map_or(Ok(()), |folder| write_tree(folder, sweep))
+    };
+    let found = pool.install(|| sweep(&asked, &scratch, &bars, write_one));
     bars.finish();
     // Each run removed its package; the folder is left where one failed.
     let _ = std::fs::remove_dir_all(&scratch);
@@ -61,72 +71,66 @@ pub fn run(args: &Args) -> Result<()> {
         let _ = std::fs::remove_dir(&args.output);
     }
     let found = found?;
-    let json = serde_json::to_string_pretty(&found).map_err(|e| Error::Internal {
-        step: "report",
-        what: e.to_string(),
-    })? + "\n";
-    write(&args.output, "sweep.json", &json)?;
-    write(&args.output, "sweep.csv", &found.csv())?;
-    write(&args.output, "sweep.svg", &plot(&found))?;
+    let (json, table) = match &found[..] {
+        [one] => (to_json(one)?, table(one)),
+        several => write_whole(&args.output, several)?,
+    };
     match (args.json, args.quiet) {
         (true, _) => print(&json),
         (false, true) => Ok(()),
-        (false, false) => print(&table(&found)),
+        (false, false) => print(&table),
     }
+}
+
+/// Where each tree's files go: DIR itself for one, a folder of its name for each of several.
+fn folders(inputs: &[PathBuf], output: &Path) -> Result<Vec<PathBuf>> {
+    if inputs.len() == 1 {
+        return Ok(vec![output.into()]);
+    }
+    let mut out: Vec<PathBuf> = Vec::with_capacity(inputs.len());
+    for input in inputs {
+        let folder = output.join(input.file_stem().unwrap_or(input.as_os_str()));
+        if let Some(first) = out.iter().position(|f| *f == folder) {
+            return Err(Error::usage(
+                format!(
+                    "{} and {} have one name, and so one folder",
+                    inputs[first].display(),
+                    input.display()
+                ),
+                "rename one of them, or sweep them separately",
+            ));
+        }
+        out.push(folder);
+    }
+    Ok(out)
+}
+
+fn write_tree(folder: &Path, found: &Sweep) -> Result<()> {
+    std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, "create", e))?;
+    write(folder, "sweep.json", &to_json(found)?)?;
+    write(folder, "sweep.csv", &found.csv())?;
+    write(folder, "sweep.svg", &plot(found))
+}
+
+/// What several trees come to, as JSON and as the tables of all.
+fn write_whole(folder: &Path, found: &[Sweep]) -> Result<(String, String)> {
+    let whole = whole(found);
+    let json = to_json(&whole)?;
+    write(folder, "sweep.json", &json)?;
+    write(folder, "sweep.csv", &whole.csv())?;
+    let trees = found.iter().map(|s| format!("{}\n{}\n", s.input, table(s)));
+    Ok((json, trees.collect::<String>() + &table_of_all(&whole)))
+}
+
+fn to_json(found: &impl serde::Serialize) -> Result<String> {
+    let text = serde_json::to_string_pretty(found).map_err(|e| Error::Internal {
+        step: "report",
+        what: e.to_string(),
+    })?;
+    Ok(text + "\n")
 }
 
 fn write(folder: &Path, name: &str, text: &str) -> Result<()> {
     let file = folder.join(name);
     std::fs::write(&file, text).map_err(|e| Error::io(&file, "write", e))
-}
-
-/// One line a run, the fastest first; a star for those on the front. `ratio` and `cpu`: time, and
-/// processor time of all threads, over those of the base.
-fn table(found: &Sweep) -> String {
-    let mut out = format!(
-        "{:<20}{:>9}{:>7}{:>7}{:>9}{:>9}{:>9}{:>8}{:>8}{:>7}{:>7}  front\n",
-        "variant",
-        "seconds",
-        "ratio",
-        "cpu",
-        "peak MB",
-        "disk MB",
-        "tex MB",
-        "F1",
-        "worst",
-        "E",
-        "area"
-    );
-    let mib = |bytes: u64| bytes as f64 / 1_048_576.0;
-    let base = found.runs.first().map_or(1.0, |r| r.seconds);
-    let base_cpu = found.runs.first().map_or(1.0, |r| r.cpu_seconds);
-    let mut runs: Vec<_> = found.runs.iter().collect();
-    runs.sort_by(|a, b| a.seconds.total_cmp(&b.seconds));
-    for run in runs {
-        let line = format!(
-            "{:<20}{:>9.1}{:>7.2}{:>7.2}{:>9.0}{:>9.1}{:>9.1}{:>8.4}{:>8.4}{:>7.2}{:>7.3}  {}",
-            run.name,
-            run.seconds,
-            run.seconds / base.max(1e-9),
-            run.cpu_seconds / base_cpu.max(1e-9),
-            mib(run.peak_bytes),
-            mib(run.package_bytes),
-            mib(run.texture_bytes),
-            run.f1_mean,
-            run.f1_worst,
-            run.shift_ratio,
-            run.area_ratio,
-            if run.on_front { "*" } else { "" }
-        );
-        out += line.trim_end();
-        out += "\n";
-    }
-    out += &format!(
-        "\nThe base took {:.2} times as long when it was baked again at the end.\n",
-        found.repeat_ratio
-    );
-    for sentence in &found.advice {
-        out += &format!("{sentence}\n");
-    }
-    out
 }

@@ -4,7 +4,7 @@ use super::Run;
 use super::variants::{BASE, PRESETS};
 
 /// Differences of F1 under this count as ties.
-const TIE: f64 = 0.003;
+pub const TIE: f64 = 0.003;
 
 /// Presets against the base, and the single knob that buys most time for nothing.
 pub fn advice(runs: &[Run]) -> Vec<String> {
@@ -16,9 +16,9 @@ pub fn advice(runs: &[Run]) -> Vec<String> {
     let mut out: Vec<String> = presets.map(|run| compare(run, base)).collect();
     let alone = runs.iter().filter(|r| !is_preset(r));
     let free = alone.clone().filter(|r| base.f1_mean - r.f1_mean < TIE);
-    let fastest = free.min_by(|a, b| a.seconds.total_cmp(&b.seconds));
+    let fastest = free.min_by(|a, b| a.cost().total_cmp(&b.cost()));
     out.extend(match fastest {
-        Some(run) if run.seconds < 0.95 * base.seconds => Some(format!(
+        Some(run) if run.cost() < 0.95 * base.cost() => Some(format!(
             "Of the knobs, {} alone saves most time for a tie in F1: {}.",
             run.name,
             change(run, base)
@@ -44,7 +44,7 @@ pub fn advice(runs: &[Run]) -> Vec<String> {
 
 /// "draft is 2.0 times faster than balanced and loses 0.010 F1 at 128 pixels."
 fn compare(run: &Run, base: &Run) -> String {
-    let ratio = base.seconds / run.seconds.max(1e-9);
+    let ratio = base.cost() / run.cost().max(1e-9);
     let speed = match ratio >= 1.0 {
         true => format!("{ratio:.1} times faster than"),
         false => format!("{:.1} times slower than", 1.0 / ratio),
@@ -72,7 +72,7 @@ fn compare(run: &Run, base: &Run) -> String {
 fn change(run: &Run, base: &Run) -> String {
     format!(
         "{:.2} of the time, F1 {:+.3}",
-        run.seconds / base.seconds.max(1e-9),
+        run.cost() / base.cost().max(1e-9),
         run.f1_mean - base.f1_mean
     )
 }

@@ -5,7 +5,7 @@ use super::{Run, Sweep};
 const WIDTH: f64 = 900.0;
 const HEIGHT: f64 = 560.0;
 /// Room for axes: left, top, right, bottom.
-const MARGIN: [f64; 4] = [70.0, 40.0, 150.0, 60.0];
+const MARGIN: [f64; 4] = [70.0, 40.0, 230.0, 60.0];
 /// Parts of an axis between its numbers.
 const STEPS: u32 = 5;
 
@@ -24,7 +24,7 @@ impl Axes {
             [(low - room).max(0.0), high + room]
         };
         Self {
-            seconds: range(|r| r.seconds),
+            seconds: range(Run::cost),
             error: range(|r| 1.0 - r.f1_mean),
         }
     }
@@ -71,13 +71,13 @@ pub fn plot(sweep: &Sweep) -> String {
         );
     }
     out += &format!(
-        "<text x=\"{}\" y=\"{}\" text-anchor=\"end\">seconds</text><text x=\"8\" y=\"22\">1 - F1, mean over levels</text>\n",
+        "<text x=\"{}\" y=\"{}\" text-anchor=\"end\">seconds of processor time, all threads</text><text x=\"8\" y=\"22\">1 - F1, mean over levels</text>\n",
         WIDTH - MARGIN[2],
         HEIGHT - MARGIN[3] + 36.0
     );
     out += &front(&axes, &sweep.runs);
     for (run, label_y) in sweep.runs.iter().zip(label_heights(&axes, &sweep.runs)) {
-        let (x, y) = (axes.x(run.seconds), axes.y(1.0 - run.f1_mean));
+        let (x, y) = (axes.x(run.cost()), axes.y(1.0 - run.f1_mean));
         let class = if run.on_front { "p f" } else { "p" };
         out += &format!(
             "<circle class=\"{class}\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"4\"/><text x=\"{:.1}\" y=\"{:.1}\">{}</text>\n",
@@ -98,7 +98,7 @@ fn label_heights(axes: &Axes, runs: &[Run]) -> Vec<f64> {
     let mut placed: Vec<[f64; 3]> = Vec::new();
     let mut out = vec![0.0; runs.len()];
     for i in order {
-        let left = axes.x(runs[i].seconds);
+        let left = axes.x(runs[i].cost());
         let right = left + 14.0 + 7.0 * runs[i].name.len() as f64;
         let mut at = y(i);
         while let Some(other) = placed
@@ -115,10 +115,10 @@ fn label_heights(axes: &Axes, runs: &[Run]) -> Vec<f64> {
 
 fn front(axes: &Axes, runs: &[Run]) -> String {
     let mut front: Vec<&Run> = runs.iter().filter(|r| r.on_front).collect();
-    front.sort_by(|a, b| a.seconds.total_cmp(&b.seconds));
+    front.sort_by(|a, b| a.cost().total_cmp(&b.cost()));
     let points: Vec<String> = front
         .iter()
-        .map(|r| format!("{:.1},{:.1}", axes.x(r.seconds), axes.y(1.0 - r.f1_mean)))
+        .map(|r| format!("{:.1},{:.1}", axes.x(r.cost()), axes.y(1.0 - r.f1_mean)))
         .collect();
     format!("<polyline class=\"f\" points=\"{}\"/>\n", points.join(" "))
 }

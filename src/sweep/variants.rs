@@ -56,8 +56,14 @@ pub fn variants() -> Vec<Variant> {
     for n in [0.01, 0.02] {
         alone(format!("sharing {n}"), &|r| r.sharing = n);
     }
+    alone("gutter_texels 4".into(), &|r| r.gutter_texels = 4.0);
     alone("rectangular cards".into(), &|r| r.triangular_cards = false);
+    // Kratt's loop, which then may choose crosses and strips, too, or planes alone.
     alone("adaptive loop".into(), &|r| r.method = Method::AdaptiveLoop);
+    alone("adaptive loop of planes".into(), &|r| {
+        r.method = Method::AdaptiveLoop;
+        r.billboards = Vec::new();
+    });
     out
 }
 
@@ -75,6 +81,7 @@ mod tests {
             for other in &all[..i] {
                 assert_ne!(variant.recipe, other.recipe, "{}", variant.name);
                 assert_ne!(variant.name, other.name);
+                assert!(!variant.name.contains(','), "`--only` splits there");
             }
         }
         assert!(all.len() > 15);
