@@ -160,7 +160,6 @@ for (const tree of trees) {
   for (const row of rows) {
     const ours = rows.find((r) => r.label === 'pleach' && r.group === row.group);
     row.time_ratio = row.cpu / ours.cpu;
-    row.bytes_ratio = row.texture_bytes / ours.texture_bytes;
     row.file = row.file.slice(options.out.length).replace(/^\//, '');
   }
   found.push({ tree: basename(tree, '.glb'), triangles: triangles(tree), rows });
