@@ -11,7 +11,8 @@ pub struct PartMesh {
     pub points: Vec<Vec3>,
     /// Triangles over `points`, in the order of the part (second sides included).
     pub triangles: Vec<[u32; 3]>,
-    /// Edges, ascending, each once, with the first and last triangle that has it.
+    /// Edges, ascending, with the triangles on both sides: each once, or where more than two
+    /// triangles meet (a skin that is pinched), once for each two that follow each other.
     pub edges: Vec<Edge>,
     /// Loops (or pieces) of edges that only one triangle has: their points.
     pub loops: Vec<Vec<u32>>,
@@ -98,12 +99,18 @@ fn edges_of(triangles: &[[u32; 3]], single: &[u32]) -> Vec<Edge> {
         }
     }
     all.sort_unstable();
-    all.chunk_by(|a, b| a.0 == b.0)
-        .map(|run| Edge {
+    let mut edges = Vec::with_capacity(all.len() / 2);
+    for run in all.chunk_by(|a, b| a.0 == b.0) {
+        let edge = |a: u32, b: u32| Edge {
             ends: run[0].0,
-            sides: [run[0].1, run[run.len() - 1].1],
-        })
-        .collect()
+            sides: [a, b],
+        };
+        match run {
+            [(_, only)] => edges.push(edge(*only, *only)),
+            _ => edges.extend(run.windows(2).map(|w| edge(w[0].1, w[1].1))),
+        }
+    }
+    edges
 }
 
 fn adjacency(points: usize, edges: &[Edge]) -> (Vec<u32>, Vec<u32>) {

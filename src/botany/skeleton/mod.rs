@@ -4,11 +4,16 @@
 //! else by level sets of the distance from its base ([`levels`]). Then the base of each part
 //! looks for the branch that carries it ([`join`]).
 
+mod bands;
 mod base;
+mod chains;
+mod fork;
 pub mod join;
 pub mod levels;
+mod line;
 pub mod mesh;
 pub mod near;
+mod pieces;
 pub mod tube;
 
 use glam::Vec3;
