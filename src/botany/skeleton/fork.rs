@@ -14,6 +14,8 @@ const SHORTEST_IN_RADII: f32 = 1.2;
 const SLIVER: f32 = 10.0 * WELD_TOLERANCE;
 /// Over this length from a fork its arms and the wood before it are compared, in radii of that wood.
 const COMPARED_IN_RADII: f32 = 4.0;
+/// What is so many times thicker than the wood at a fork is what carries that wood, not the same stem.
+const OTHER_WOOD: f32 = 1.8;
 /// How far from a fork clean wood is looked for, in radii of the wood before it.
 const LOOK_IN_RADII: f32 = 16.0;
 /// What is shorter than this many radii beyond a fork hardly goes on.
@@ -72,7 +74,9 @@ impl Arm {
     /// The wood below a fork, looked at from there; `side` is the radius of the thinner arm.
     fn below(pieces: &[Piece], fork: u32, side: f32) -> Self {
         let here = &pieces[fork as usize];
-        let down = std::iter::successors(Some(fork), |&p| pieces[p as usize].parent);
+        let thickest = OTHER_WOOD * here.radius;
+        let down = std::iter::successors(Some(fork), |&p| pieces[p as usize].parent)
+            .take_while(|&p| pieces[p as usize].radius <= thickest);
         let mut way = within(pieces, down, LOOK_IN_RADII * here.radius);
         way.reverse();
         let mut shared = shared(pieces, &way);
@@ -205,6 +209,9 @@ fn continuation(pieces: &[Piece], next: &[Option<u32>], at: u32) -> Option<u32> 
     };
     let best =
         (0..children.len()).max_by(|&a, &b| score(a).total_cmp(&score(b)).then(b.cmp(&a)))?;
+    if pieces[children[best] as usize].thickness < SLIVER {
+        return Some(children[best]);
+    }
     let kept = arms[best].radius / before.radius.max(1e-12);
     let is_rival = |i: usize| i != best && arms[i].radius >= RIVAL * arms[best].radius;
     let leads = kept >= LEADER || !(0..arms.len()).any(is_rival);

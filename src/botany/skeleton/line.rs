@@ -51,3 +51,37 @@ fn deviation(nodes: &[(Vec3, f32)], from: usize, to: usize, i: usize) -> f32 {
         .max((a + (b - a) * along - r).abs());
     off / r.max(1e-9)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_what_shows_the_line_is_kept() {
+        let mut nodes: Vec<(Vec3, f32)> = (0..=10).map(|i| (Vec3::Y * i as f32, 1.0)).collect();
+        nodes.extend((1..=10).map(|i| (Vec3::new(i as f32, 10.0, 0.0), 1.0)));
+        let mut keep = vec![false; nodes.len()];
+        // A fork.
+        keep[4] = true;
+        needed(&nodes, &mut keep);
+        let kept: Vec<usize> = (0..nodes.len()).filter(|&i| keep[i]).collect();
+        assert_eq!(kept, [0, 4, 10, 20]);
+    }
+
+    #[test]
+    fn a_change_of_radius_is_kept() {
+        let radius = |i: usize| if i < 6 { 1.0 } else { 0.5 };
+        let nodes: Vec<(Vec3, f32)> = (0..12).map(|i| (Vec3::Y * i as f32, radius(i))).collect();
+        let mut keep = vec![false; 12];
+        needed(&nodes, &mut keep);
+        assert!(keep[5] && keep[6], "{keep:?}");
+    }
+
+    #[test]
+    fn nodes_that_hold_a_branch_too_go_back_on_the_line() {
+        let mut nodes: Vec<(Vec3, f32)> = (0..5).map(|i| (Vec3::Y * i as f32, 1.0)).collect();
+        nodes[2] = (Vec3::new(0.7, 2.0, 0.0), 1.6);
+        straighten(&mut nodes, &[true, true, false, true, true]);
+        assert_eq!(nodes[2], (Vec3::Y * 2.0, 1.0));
+    }
+}
