@@ -74,10 +74,16 @@ pub fn cut(mesh: &PartMesh, distance: &[f32]) -> Bands {
     let edges = (0..mesh.edges.len() as u32).collect();
     let mut open = cutter.connected(whole, 0, triangles, edges);
     let mut pieces: Vec<Region> = Vec::new();
-    while let Some(region) = open.pop() {
+    while let Some(mut region) = open.pop() {
         let middle = 0.5 * (region.extent.low + region.extent.high);
         let halves = region.extent.low < middle && middle < region.extent.high;
         if !halves || region.halvings >= MOST_HALVINGS || cutter.is_fine(&region) {
+            // What hangs on a point begins there.
+            let begins = region
+                .triangles
+                .iter()
+                .map(|&t| cutter.ranges[t as usize][0]);
+            region.extent.low = region.extent.low.max(begins.fold(f32::MAX, f32::min));
             pieces.push(region);
         } else {
             open.extend(cutter.halve(region, middle));
