@@ -232,7 +232,8 @@ mod tests {
         let order = actor.front_to_back(forward);
         let mut drawn = order.triangles.clone();
         let mut all = model.triangles.clone();
-        (drawn.sort_unstable(), all.sort_unstable());
+        drawn.sort_unstable();
+        all.sort_unstable();
         assert_eq!(drawn, all);
         let depth = |t: &[u32; 3]| {
             let corner = |&i: &u32| model.positions[i as usize].dot(forward);
