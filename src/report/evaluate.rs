@@ -115,7 +115,7 @@ pub fn evaluate(
     let levels = rows.split_off(1);
     Report {
         position_step_m: original.0.position_step,
-        focal_px: settings.lens.focal_px().map(f64::from),
+        focal_px: settings.lens.focal_px(),
         original: rows.pop(),
         levels,
         ..Report::default()
@@ -162,7 +162,7 @@ fn in_order(mut heights: Vec<u32>) -> Vec<u32> {
 fn distance_m(original: &Model, lens: Lens, height_px: u32) -> f64 {
     let height_m = f64::from(original.height()) * original.frame.radius;
     let usual = Lens::SCREEN_LINES / (2.0 * (Lens::FIELD_OF_VIEW_DEG / 2.0).to_radians().tan());
-    let focal_px = lens.focal_px().map_or(usual, f64::from);
+    let focal_px = lens.focal_px().unwrap_or(usual);
     height_m * focal_px / f64::from(height_px)
 }
 

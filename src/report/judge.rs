@@ -75,7 +75,7 @@ pub fn judge(
     }
     Ok(Report {
         position_step_m: original.0.position_step,
-        focal_px: settings.lens.focal_px().map(f64::from),
+        focal_px: settings.lens.focal_px(),
         original: whole,
         levels: measured,
         ..Report::default()

@@ -18,7 +18,7 @@ pub enum Lens {
     Parallel,
     /// They meet in the eye. The focal length is in pixels: what is `d` away and `h` high takes
     /// `focal * h / d` pixels.
-    Focal(f32),
+    Focal(f64),
 }
 
 impl Lens {
@@ -30,11 +30,11 @@ impl Lens {
     /// The lens of a screen with so many lines and a vertical field of view in degrees:
     /// `f = lines / (2 tan(fov / 2))`.
     pub fn of_screen(lines: f64, fov_deg: f64) -> Self {
-        Self::Focal((lines / (2.0 * (fov_deg / 2.0).to_radians().tan())) as f32)
+        Self::Focal(lines / (2.0 * (fov_deg / 2.0).to_radians().tan()))
     }
 
     /// Focal length in pixels; `None` where lines of sight are parallel.
-    pub fn focal_px(self) -> Option<f32> {
+    pub fn focal_px(self) -> Option<f64> {
         match self {
             Self::Parallel => None,
             Self::Focal(focal_px) => Some(focal_px),
@@ -135,7 +135,7 @@ impl View {
         let Some(focal_px) = lens.focal_px() else {
             return flat;
         };
-        let distance = (focal_px / flat.pixels).max(NEAREST_EYE);
+        let distance = (focal_px as f32 / flat.pixels).max(NEAREST_EYE);
         let focal_px = distance * flat.pixels;
         // The sphere's rim is seen where lines of sight touch it.
         let rim = focal_px * ROOM / (distance * distance - ROOM * ROOM).sqrt();
@@ -199,7 +199,7 @@ mod tests {
     #[test]
     fn a_lens_shows_the_height_at_the_distance_that_levels_state() {
         // 1080 lines, 60 degrees: f = 1080 / (2 tan 30 degrees) = 935.3.
-        let focal_px = Lens::default().focal_px().unwrap();
+        let focal_px = Lens::default().focal_px().unwrap() as f32;
         assert!((focal_px - 935.307).abs() < 1e-3, "{focal_px}");
         for (height, height_px) in [(1.4, 512), (1.4, 64), (1.9, 32)] {
             for view in views(16, 11.0) {
