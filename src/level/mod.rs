@@ -1,5 +1,6 @@
 //! One level of a package: which wood and cards draw it, their texels, and its covered area.
 
+mod few;
 mod fit;
 mod share;
 mod sided;
@@ -163,6 +164,7 @@ impl Baker<'_> {
             return self.finished(self.fit(plan, request, watch)?, watch);
         };
         let made = self.fit(plan, request, watch)?;
+        let made = self.nearer(made, request, watch)?;
         let least = made.least_view(self.original);
         if least >= LEAST_VIEW {
             return self.finished(made, watch);

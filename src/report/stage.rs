@@ -251,8 +251,8 @@ mod tests {
         let actors = [Actor::new(&model, &model, true)];
         let view = &crate::space::view::views(16, 11.0)[7];
         assert_eq!(
-            [512, 300, 128, 32].map(|px| sampling(px).side),
-            [4, 4, 8, 32]
+            [512, 300, 128, 64, 32].map(|px| sampling(px).side),
+            [4, 4, 4, 8, 16]
         );
         for lens in [Lens::default(), Lens::Parallel] {
             let whole = view.camera_through(lens, model.height(), 300);

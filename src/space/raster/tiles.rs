@@ -102,13 +102,17 @@ mod tests {
         Camera, Geometry, Items, Material, Sampling, Scene, coverage, coverage_with_stats, draw,
     };
 
-    /// A ball of many small triangles: most are hidden.
-    fn ball() -> (Vec<Vec3>, Vec<[u32; 3]>) {
-        let random = |i: u32| ((i as f32 * 0.618_034).fract() + (i as f32 * 0.137).fract()).fract();
+    /// A cube full of small triangles: most are hidden.
+    fn thicket() -> (Vec<Vec3>, Vec<[u32; 3]>) {
+        let random = |i: u32| {
+            let mixed = (i ^ (i >> 15)).wrapping_mul(0x2c1b_3c6d);
+            let mixed = (mixed ^ (mixed >> 12)).wrapping_mul(0x297a_2d39);
+            (mixed ^ (mixed >> 15)) as f32 / u32::MAX as f32
+        };
         let corner = |i: u32| {
-            let center = i / 3 * 11;
+            let center = i / 3 * 8;
             let around = |k: u32| random(center + k) * 1.6 - 0.8;
-            let off = |k: u32| (random(i * 5 + k) - 0.5) * 0.1;
+            let off = |k: u32| (random(1_000_000 + i * 8 + k) - 0.5) * 0.2;
             Vec3::new(around(1) + off(1), around(2) + off(2), around(3) + off(3))
         };
         let count = 12_000;
@@ -119,7 +123,7 @@ mod tests {
 
     #[test]
     fn what_is_passed_over_would_not_have_been_seen() {
-        let (positions, triangles) = ball();
+        let (positions, triangles) = thicket();
         let materials = [Material {
             double_sided: true,
             ..Material::default()
@@ -156,7 +160,7 @@ mod tests {
         }
         assert!(covered > 20_000, "{covered}");
         let (all, stats) = coverage_with_stats(&scene(&triangles), &camera, sampling);
-        assert!(stats.fragments > 10 * stats.covered, "{stats:?}");
+        assert!(stats.fragments > 5 * stats.covered, "{stats:?}");
         assert_eq!(all, coverage(&scene(&triangles), &camera, sampling));
     }
 }

@@ -243,7 +243,7 @@ mod tests {
         let impostor = bake_some(model, kind, texels, wanted);
         // Along parallel lines, as it was baked.
         let drawable = Drawable::silhouette(model);
-        let reference = Reference::of(&drawable, model, &[view], Lens::Parallel, 96);
+        let reference = Reference::of(&drawable, model, &[view], Lens::Parallel, 128);
         let compared = reference.compare_drawn(|camera| shown(&impostor, camera, true));
         compared.f1.mean
     }
