@@ -1,9 +1,9 @@
 //! Any wood at all: level sets of the geodesic distance from the base.
 //!
 //! Verroust and Lazarus, "Extracting skeletal curves from 3D scattered data", The Visual Computer
-//! 16, 2000. The surface is cut into bands of equal distance along the surface ([`bands`]); each
-//! connected piece of a band is a node ([`pieces`](super::pieces)). Where a band falls into several
-//! pieces the wood forks, and one of them goes on as the same chain ([`chains`]).
+//! 16, 2000. The surface is cut into bands of equal distance along the surface (`bands.rs`); each
+//! connected piece of a band is a node (`pieces.rs`). Where a band falls into several
+//! pieces the wood forks, and one of them goes on as the same chain (`chains.rs`).
 
 use super::base::{base, distances, ring_of};
 use super::mesh::PartMesh;
