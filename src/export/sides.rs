@@ -2,7 +2,8 @@
 //!
 //! One texture serves both sides of most cards: the crown behind it looks like the crown before it. Where
 //! leaves have pale undersides, or flowers only look out of the crown, the sides differ, and the
-//! card is drawn twice, a hair apart: each side hides the other (Kratt 2014, 3.2; Deng, "Billboards").
+//! card is drawn twice, a hair apart: each side hides the other. (Deng bakes a texture for each side of every
+//! billboard.)
 
 use glam::Vec3;
 use rayon::prelude::*;

@@ -104,7 +104,6 @@ pub fn evaluate(
         starts_px: &settings.starts(levels.len()),
         looks: settings.appearance,
         client: settings.client,
-        original_client_every: 1,
         base_colors: settings.client,
     };
     let found = measure(&asked, &actors(&asked), &all);

@@ -19,9 +19,6 @@ pub struct Judged {
     pub heights_px: Vec<u32>,
 }
 
-/// The original as an engine draws it is there for comparison: a view of each elevation and the top do.
-const ORIGINAL_CLIENT_EVERY: usize = 3;
-
 /// Distinct heights of all levels, largest first.
 pub fn heights(levels: &[Judged]) -> Vec<u32> {
     let mut heights: Vec<u32> = levels.iter().flat_map(|l| l.heights_px.clone()).collect();
@@ -31,7 +28,7 @@ pub fn heights(levels: &[Judged]) -> Vec<u32> {
 }
 
 /// Figures of every level at its own sizes, supersampled and as an engine draws it; the original
-/// as an engine draws it, at all of them, in every third view. `step` is called after each of [`heights`].
+/// as an engine draws it, at all of them. `step` is called after each of [`heights`].
 ///
 /// # Errors
 /// Those of `step`.
@@ -59,7 +56,6 @@ pub fn judge(
         starts_px: &[],
         looks: false,
         client: true,
-        original_client_every: ORIGINAL_CLIENT_EVERY,
         base_colors: false,
     };
     let actors = actors(&asked);

@@ -32,8 +32,6 @@ pub struct Asked<'a> {
     pub looks: bool,
     /// Whether everything is also drawn as an engine does.
     pub client: bool,
-    /// In every how manieth view the original is drawn so: it costs as much as all the rest.
-    pub original_client_every: usize,
     /// Whether the base colours of that are wanted.
     pub base_colors: bool,
 }
@@ -54,11 +52,7 @@ pub fn measure(asked: &Asked, actors: &[Actor], heights_px: &[u32]) -> Vec<Found
     let mut views: Vec<Vec<OfView>> = asked
         .views
         .par_iter()
-        .enumerate()
-        .map(|(index, view)| {
-            let original_client = asked.client && index % asked.original_client_every == 0;
-            Stand::new(asked, actors, view, original_client).measure(heights_px)
-        })
+        .map(|view| Stand::new(asked, actors, view).measure(heights_px))
         .collect();
     let moved: Vec<(u32, f64)> = heights_px
         .iter()

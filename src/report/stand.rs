@@ -53,8 +53,6 @@ pub struct Stand<'a> {
     asked: &'a Asked<'a>,
     actors: &'a [Actor<'a>],
     view: &'a View,
-    /// Whether the original is drawn as an engine does, too.
-    original_client: bool,
     /// The view a frame later, for views that orbits are measured from.
     next: Option<View>,
     /// For each actor its triangles as this view draws them, where colours are.
@@ -81,12 +79,7 @@ impl Drawn {
 
 impl<'a> Stand<'a> {
     /// Of the original and all levels (`actors`, in that order).
-    pub fn new(
-        asked: &'a Asked,
-        actors: &'a [Actor],
-        view: &'a View,
-        original_client: bool,
-    ) -> Self {
+    pub fn new(asked: &'a Asked, actors: &'a [Actor], view: &'a View) -> Self {
         let next = (view.elevation_deg == 0.0).then(|| View {
             azimuth_deg: view.azimuth_deg + STEP_DEG,
             ..view.clone()
@@ -97,7 +90,6 @@ impl<'a> Stand<'a> {
             asked,
             actors,
             view,
-            original_client,
             next,
             orders: match asked.looks {
                 true => orders.collect(),
@@ -175,7 +167,7 @@ impl<'a> Stand<'a> {
             height_px,
             outline: wanted.then(itself),
             moved_f1,
-            client: if wanted && self.original_client {
+            client: if wanted {
                 self.client(drawn, 0, camera)
             } else {
                 None
