@@ -5,8 +5,8 @@ use glam::{Vec2, Vec3};
 use super::drawable::Drawable;
 use crate::botany::Model;
 use crate::space::raster::{
-    Camera, Coverage, Geometry, Items, Layers, Light, Mask, Placement, Relief, Sampling, Scene,
-    coverage, coverage_multisampled, draw,
+    Camera, Coverage, Geometry, Layers, Light, Mask, Placement, Relief, Sampling, Scene, coverage,
+    coverage_multisampled, layers,
 };
 use crate::space::view::{Lens, View};
 
@@ -98,8 +98,8 @@ impl<'m> Actor<'m> {
         order
     }
 
-    /// Lit, supersampled: what is seen at each sample, and in each pixel.
-    pub fn layers(&self, camera: &Camera, sampling: Sampling, order: &Order) -> (Items, Layers) {
+    /// Lit, supersampled: which samples are hit, and what each pixel shows.
+    pub fn layers(&self, camera: &Camera, sampling: Sampling, order: &Order) -> (Mask, Layers) {
         let scene = self.drawable.scene();
         let scene = Scene {
             geometry: Geometry {
@@ -111,9 +111,7 @@ impl<'m> Actor<'m> {
         };
         let camera = camera.placed(self.place);
         let reliefs: Vec<Option<Relief>> = self.drawable.reliefs();
-        let items = draw(&scene, &camera, sampling);
-        let layers = items.layers(&scene, &camera, sampling, Light::Outdoors, &reliefs);
-        (items, layers)
+        layers(&scene, &camera, sampling, Light::Outdoors, &reliefs)
     }
 
     /// Where it is, supersampled.
@@ -131,8 +129,7 @@ impl<'m> Actor<'m> {
     /// an engine draws it: one sample a pixel, mips.
     pub fn base_color(&self, camera: &Camera) -> [f64; 4] {
         let (scene, camera) = (self.drawable.scene(), camera.placed(self.place));
-        let items = draw(&scene, &camera, Sampling::CLIENT);
-        let layers = items.layers(&scene, &camera, Sampling::CLIENT, Light::Unlit, &[]);
+        let (_, layers) = layers(&scene, &camera, Sampling::CLIENT, Light::Unlit, &[]);
         let sum = |c: usize| layers.color.iter().map(|p| f64::from(p[c])).sum();
         let covered = layers.coverage.iter().map(|&c| f64::from(c)).sum();
         [sum(0), sum(1), sum(2), covered]
@@ -261,8 +258,8 @@ mod tests {
             let area = actors[0].mask(&whole, sampling(300)).area();
             assert_eq!(actors[0].mask(&camera, sampling(300)).area(), area);
             let order = actors[0].front_to_back(camera.forward);
-            let (items, layers) = actors[0].layers(&camera, sampling(300), &order);
-            assert_eq!(items.mask().coverage().fraction, layers.coverage);
+            let (mask, layers) = actors[0].layers(&camera, sampling(300), &order);
+            assert_eq!(mask.coverage().fraction, layers.coverage);
             // Parts of sixteen, and not of four alone.
             let parts: Vec<f32> = layers.coverage.iter().map(|c| c * 16.0).collect();
             assert!(parts.iter().all(|p| p.fract() == 0.0));

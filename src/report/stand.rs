@@ -225,9 +225,9 @@ impl<'a> Stand<'a> {
             };
         }
         let order = &self.orders[actor];
-        let (items, layers) = self.actors[actor].layers(camera, sampling, order);
+        let (mask, layers) = self.actors[actor].layers(camera, sampling, order);
         Drawn {
-            mask: keep.then(|| items.mask()),
+            mask: keep.then_some(mask),
             coverage: Vec::new(),
             shot: Some(Shot::new(layers)),
         }

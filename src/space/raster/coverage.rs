@@ -1,9 +1,10 @@
 //! Which samples a scene hits: alpha without colour or depth, the fast path.
 
+use super::pane::{Pane, Panes};
 use super::row::is_all;
-use super::seen::seen;
+use super::seen::{Seen, seen};
 use super::tiles::Tiles;
-use super::triangle::CENTER;
+use super::triangle::{CENTER, Plane};
 use super::{Camera, Mips, Sampling, Scene};
 
 /// For every sample, whether anything hits it.
@@ -76,40 +77,27 @@ impl Mask {
         let side = self.side;
         let sampling = Sampling { side, mips };
         let corners = camera.project(scene.geometry.positions, side);
-        let (width, height) = ((self.width * side) as i32, (self.height * side) as i32);
-        let samples = &mut self.samples;
+        let size = [self.width * side, self.height * side].map(|s| s as i32);
         let mut fragments = 0;
-        let mut tiles = Tiles::new(width, height);
-        // Whatever is there hides all the rest.
-        let least = |samples: &[u8]| match samples.contains(&0) {
-            true => f32::NEG_INFINITY,
-            false => f32::INFINITY,
-        };
-        for shown in seen(scene, &corners, CENTER) {
-            // What lies in full tiles alone is not even scanned.
-            if !COUNTED && tiles.hide(&shown.corners, 0.0, |range| least(&samples[range])) {
-                continue;
-            }
-            let mut fragment = None;
-            shown.triangle.rows(width, height, CENTER, |y, row| {
-                let first = y as usize * width as usize;
-                let (from, to) = row.reach();
-                // Inside a crown most samples are hit: edges are not even looked at.
-                if !COUNTED && is_all::<1>(&samples[first + from..first + to]) {
-                    return;
-                }
-                let [(from, to)] = row.spans();
-                if from >= to {
-                    return;
-                }
-                fragments += (to - from) as u64;
-                let row = &mut samples[first + from as usize..first + to as usize];
-                if shown.material.cutoff.is_none() {
-                    return row.fill(1);
-                }
-                let fragment = fragment.get_or_insert_with(|| shown.fragment(scene, sampling));
-                fragment.test_row(y, from, row);
+        let mut tiles = Tiles::default();
+        let mut hits = Vec::new();
+        for (pane, ids) in Panes::new::<u8, 1>(scene, &corners, size, side as i32, CENTER).each() {
+            hits.clear();
+            let rows = pane.y[0]..pane.y[1];
+            let of_picture = |y: i32| {
+                let first = y as usize * size[0] as usize;
+                first + pane.x[0] as usize..first + pane.x[1] as usize
+            };
+            rows.clone()
+                .for_each(|y| hits.extend_from_slice(&self.samples[of_picture(y)]));
+            tiles.clear(&pane);
+            let all = ids.iter().filter_map(|&id| seen(scene, &corners, id));
+            all.for_each(|shown| {
+                fragments += hit::<COUNTED>(&shown, scene, sampling, &pane, &mut tiles, &mut hits);
             });
+            for (y, row) in rows.zip(hits.chunks_exact(pane.width())) {
+                self.samples[of_picture(y)].copy_from_slice(row);
+            }
         }
         fragments
     }
@@ -185,6 +173,55 @@ impl Coverage {
     pub fn silhouette(&self) -> Vec<bool> {
         self.fraction.iter().map(|&c| c >= 0.5).collect()
     }
+}
+
+/// Sets the samples of a pane that a triangle hits; returns those inside it, if they are counted.
+#[inline]
+fn hit<const COUNTED: bool>(
+    shown: &Seen,
+    scene: &Scene,
+    sampling: Sampling,
+    pane: &Pane,
+    tiles: &mut Tiles,
+    hits: &mut [u8],
+) -> u64 {
+    // Whatever is there hides all the rest.
+    let least = |samples: &[u8]| match is_all::<1>(samples) {
+        true => f32::INFINITY,
+        false => f32::NEG_INFINITY,
+    };
+    let mut fragments = 0;
+    let mut fragment = None;
+    let mut draw = |part: &Pane, hits: &mut [u8]| {
+        shown.triangle.rows(part, CENTER, |y, row| {
+            let first = pane.row(y);
+            let column = |x: i32| first + (x - pane.x[0]) as usize;
+            let [from, to] = row.reach().map(column);
+            // Inside a crown most samples are hit: edges are not even looked at.
+            if !COUNTED && is_all::<1>(&hits[from..to]) {
+                return;
+            }
+            let [(from, to)] = row.spans();
+            if from >= to {
+                return;
+            }
+            fragments += (to - from) as u64;
+            let row = &mut hits[column(from)..column(to)];
+            if shown.material.cutoff.is_none() {
+                return row.fill(1);
+            }
+            let fragment = fragment.get_or_insert_with(|| shown.fragment(scene, sampling));
+            fragment.test_row(y, from, row);
+        });
+    };
+    if COUNTED {
+        draw(pane, hits);
+    } else {
+        // What lies in full tiles alone is not even scanned.
+        let flat = (0.0, Plane::default);
+        tiles.visible(&shown.triangle, pane, flat, hits, least, draw);
+    }
+    fragments
 }
 
 /// Adds a row of samples to the pixels' sums; a fixed side lets the compiler use wide registers.

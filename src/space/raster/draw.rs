@@ -1,8 +1,8 @@
 //! The nearest triangle of every sample.
 
-use std::ops::Range;
-
-use super::seen::seen;
+use super::camera::Corner;
+use super::pane::{Pane, Panes};
+use super::seen::{Seen, seen};
 use super::tiles::Tiles;
 use super::triangle::CENTER;
 use super::{Camera, Sampling, Scene};
@@ -29,63 +29,116 @@ pub struct Items {
 /// Draws the scene; of triangles equally near the first one stays.
 pub fn draw(scene: &Scene, camera: &Camera, sampling: Sampling) -> Items {
     let corners = camera.project(scene.geometry.positions, sampling.side);
-    let (width, height) = (
-        (camera.width * sampling.side) as i32,
-        (camera.height * sampling.side) as i32,
-    );
-    let count = width as usize * height as usize;
-    let mut near = vec![f32::NEG_INFINITY; count];
-    let mut items = vec![EMPTY; count];
-    // For each sample of a row, whether it is hidden; then, whether it is seen.
-    let (mut hidden, mut tested) = (Vec::<u8>::new(), Vec::<u8>::new());
-    let mut tiles = Tiles::new(width, height);
-    for shown in seen(scene, &corners, CENTER) {
+    let side = sampling.side as i32;
+    let size = [camera.width as i32 * side, camera.height as i32 * side];
+    let count = size[0] as usize * size[1] as usize;
+    let mut items = Items {
+        width: camera.width,
+        height: camera.height,
+        side: sampling.side,
+        triangle: vec![EMPTY; count],
+        near: vec![f32::NEG_INFINITY; count],
+    };
+    let mut front = Front::default();
+    for (pane, ids) in Panes::new::<(f32, u32), 1>(scene, &corners, size, side, CENTER).each() {
+        front.draw(scene, &corners, sampling, &pane, ids);
+        for y in pane.y[0]..pane.y[1] {
+            let from = pane.row(y)..pane.row(y) + pane.width();
+            let to = y as usize * size[0] as usize + pane.x[0] as usize;
+            items.near[to..to + pane.width()].copy_from_slice(&front.near[from.clone()]);
+            let found = items.triangle[to..].iter_mut().zip(&front.items[from]);
+            found.for_each(|(to, &item)| *to = ids.get(item as usize).copied().unwrap_or(EMPTY));
+        }
+    }
+    items
+}
+
+/// What is nearest in one pane.
+#[derive(Default)]
+pub(super) struct Front {
+    /// For each sample of the pane the place of its triangle in the pane's list, or [`EMPTY`].
+    pub items: Vec<u32>,
+    /// As [`Items::near`].
+    pub near: Vec<f32>,
+    tiles: Tiles,
+    /// For each sample of a row, whether it is hidden; then, whether it is seen.
+    hidden: Vec<u8>,
+    tested: Vec<u8>,
+}
+
+impl Front {
+    /// Draws those of the scene's triangles that have the numbers `ids`.
+    pub fn draw(
+        &mut self,
+        scene: &Scene,
+        corners: &[Corner],
+        sampling: Sampling,
+        pane: &Pane,
+        ids: &[u32],
+    ) {
+        let count = pane.width() * pane.height();
+        self.items.clear();
+        self.items.resize(count, EMPTY);
+        self.near.clear();
+        self.near.resize(count, f32::NEG_INFINITY);
+        self.tiles.clear(pane);
+        for (place, &id) in (0..).zip(ids) {
+            if let Some(shown) = seen(scene, corners, id) {
+                self.add(&shown, scene, sampling, pane, place);
+            }
+        }
+    }
+
+    fn add(&mut self, shown: &Seen, scene: &Scene, sampling: Sampling, pane: &Pane, place: u32) {
+        let Self {
+            items,
+            near,
+            tiles,
+            hidden,
+            tested,
+        } = self;
         let nearest = shown
             .corners
             .iter()
             .map(|c| c.near)
             .fold(f32::MIN, f32::max);
-        let least = |samples: Range<usize>| near[samples].iter().copied().fold(f32::MAX, f32::min);
-        if tiles.hide(&shown.corners, nearest, least) {
-            continue;
-        }
+        let least = |near: &[f32]| near.iter().copied().fold(f32::MAX, f32::min);
+        let plane = || shown.triangle.near_plane(shown.corners);
         let mut fragment = None;
         let mut depth = None;
-        let id = shown.id as u32;
-        shown.triangle.scan(width, height, |y, from, to| {
-            let depth = depth.get_or_insert_with(|| shown.triangle.near_plane(shown.corners));
-            let depth = depth.row(y);
-            let row = y as usize * width as usize;
-            let row = row + from as usize..row + to as usize;
-            let (near, items) = (&mut near[row.clone()], &mut items[row]);
-            tested.clear();
-            let is_hidden = |(near, x): (&f32, i32)| u8::from(depth.value(x) <= *near);
-            tested.extend(near.iter().zip(from..).map(is_hidden));
-            if shown.material.cutoff.is_none() {
-                tested.iter_mut().for_each(|t| *t ^= 1);
-            } else if tested.contains(&0) {
-                hidden.clone_from(&tested);
-                let fragment = fragment.get_or_insert_with(|| shown.fragment(scene, sampling));
-                fragment.test_row(y, from, &mut tested);
-                tested.iter_mut().zip(&hidden).for_each(|(t, h)| *t ^= h);
-            } else {
-                return;
-            }
-            // Eight at a time are passed over where none is seen.
-            for (first, eight) in (0..).step_by(8).zip(tested.chunks(8)) {
-                if eight.contains(&1) {
-                    for (i, _) in (first..).zip(eight).filter(|(_, seen)| **seen == 1) {
-                        (near[i], items[i]) = (depth.value(from + i as i32), id);
+        let draw = |part: &Pane, near: &mut [f32]| {
+            shown.triangle.scan(part, |y, from, to| {
+                let depth = depth.get_or_insert_with(plane);
+                let depth = depth.row(y);
+                let row = pane.row(y);
+                let row = row + (from - pane.x[0]) as usize..row + (to - pane.x[0]) as usize;
+                let (near, items) = (&mut near[row.clone()], &mut items[row]);
+                tested.clear();
+                let is_hidden = |(near, x): (&f32, i32)| u8::from(depth.value(x) <= *near);
+                tested.extend(near.iter().zip(from..).map(is_hidden));
+                if shown.material.cutoff.is_none() {
+                    tested.iter_mut().for_each(|t| *t ^= 1);
+                } else if tested.contains(&0) {
+                    hidden.clone_from(tested);
+                    let fragment = fragment.get_or_insert_with(|| shown.fragment(scene, sampling));
+                    fragment.test_row(y, from, tested);
+                    tested
+                        .iter_mut()
+                        .zip(hidden.iter())
+                        .for_each(|(t, h)| *t ^= h);
+                } else {
+                    return;
+                }
+                // Eight at a time are passed over where none is seen.
+                for (first, eight) in (0..).step_by(8).zip(tested.chunks(8)) {
+                    if eight.contains(&1) {
+                        for (i, _) in (first..).zip(eight).filter(|(_, seen)| **seen == 1) {
+                            (near[i], items[i]) = (depth.value(from + i as i32), place);
+                        }
                     }
                 }
-            }
-        });
-    }
-    Items {
-        width: camera.width,
-        height: camera.height,
-        side: sampling.side,
-        triangle: items,
-        near,
+            });
+        };
+        tiles.visible(&shown.triangle, pane, (nearest, plane), near, least, draw);
     }
 }

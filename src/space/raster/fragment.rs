@@ -1,7 +1,7 @@
 //! What the material of one triangle gives at its samples: alpha test and base colour.
 
-use super::camera::Corner;
-use super::piece::Piece;
+use super::camera::{Corner, SUBSAMPLES};
+use super::piece::{MOST_OFF, Piece, longest};
 use super::row::TexelRow;
 use super::texture::{Address, Texture, UNIT};
 use super::triangle::{Plane, Triangle};
@@ -17,6 +17,8 @@ pub(super) struct Fragment<'a> {
     /// The level of the whole triangle, where lines of sight are parallel or as good as that.
     lod: Option<f32>,
     mips: Mips,
+    /// Samples of a row over which texture coordinates are as good as straight, a power of two.
+    piece: i32,
     /// Vertex alpha, where vertices have colours.
     alpha: Option<Plane>,
 }
@@ -26,6 +28,25 @@ pub(super) struct Fragment<'a> {
 fn is_far(q: [f32; 3]) -> bool {
     let (low, high) = (q[0].min(q[1]).min(q[2]), q[0].max(q[1]).max(q[2]));
     high - low < low / 64.0
+}
+
+/// What texture coordinates are multiplied and divided by: one over the corners' distances, or ones
+/// where the middle of the triangle moves by less than [`MOST_OFF`] samples without.
+pub(super) fn divisors(corners: &[Corner; 3]) -> [f32; 3] {
+    let [a, b, c] = corners;
+    let q = corners.map(|c| c.q);
+    let extent = |of: fn(&Corner) -> i32| {
+        let [a, b, c] = [of(a), of(b), of(c)];
+        a.max(b).max(c) as f32 - a.min(b).min(c) as f32
+    };
+    let samples = extent(|c| c.x).max(extent(|c| c.y)) / SUBSAMPLES as f32;
+    let (low, high) = (q[0].min(q[1]).min(q[2]), q[0].max(q[1]).max(q[2]));
+    // A straight line over n samples in which the divisor changes by the factor r is off by at most
+    // about n |r - 1| / 4 of them.
+    match samples * (high - low) <= 4.0 * MOST_OFF * low {
+        true => [1.0; 3],
+        false => q,
+    }
 }
 
 impl<'a> Fragment<'a> {
@@ -42,11 +63,7 @@ impl<'a> Fragment<'a> {
             .texture
             .filter(|_| !uvs.is_empty())
             .map(|i| &scene.textures[i as usize]);
-        // A face that is as far everywhere is as flat as one that parallel lines of sight meet.
-        let q = match corners.map(|c| c.q) {
-            [a, b, c] if a == b && b == c => [1.0; 3],
-            q => q,
-        };
+        let q = divisors(corners);
         let flat = q == [1.0; 3];
         let mut fragment = Self {
             texture,
@@ -56,8 +73,12 @@ impl<'a> Fragment<'a> {
             q: triangle.plane(q),
             lod: None,
             mips: sampling.mips,
+            piece: 1,
             alpha: None,
         };
+        if !flat {
+            fragment.piece = longest(fragment.q.dx, q[0].min(q[1]).min(q[2]));
+        }
         if texture.is_some() {
             let uv = indices.map(|i| uvs[i as usize]);
             fragment.u = triangle.plane(std::array::from_fn(|i| uv[i].x * q[i]));
@@ -170,8 +191,9 @@ impl<'a> Fragment<'a> {
                 let factor = self.material.factor[3];
                 let (mut from, mut rest) = (from, samples);
                 while !rest.is_empty() {
-                    let Piece { length, u, v } = Piece::new(rows, from, rest.len());
-                    let (piece, after) = rest.split_at_mut(length);
+                    let Piece { end, u, v } = Piece::of(rows, from, self.piece);
+                    let length = (end - from) as usize;
+                    let (piece, after) = rest.split_at_mut(length.min(rest.len()));
                     let row = TexelRow {
                         level,
                         u,
@@ -179,7 +201,7 @@ impl<'a> Fragment<'a> {
                         address,
                     };
                     row.test(from, piece, |alpha| factor * (alpha * UNIT) >= cutoff);
-                    (from, rest) = (from + length as i32, after);
+                    (from, rest) = (end, after);
                 }
             }
             _ => {
@@ -201,16 +223,15 @@ impl<'a> Fragment<'a> {
         })
     }
 
-    /// Linear base colour without vertex colours.
-    pub fn albedo(&self, x: i32, y: i32) -> [f32; 3] {
+    /// Linear base colour without vertex colours at a place where the divisor has this value.
+    pub fn albedo(&self, at: [f32; 2], q: f32) -> [f32; 3] {
         let [r, g, b, _] = self.material.factor;
-        match self.texture {
-            None => [r, g, b],
-            Some(texture) => {
-                let (uv, lod) = self.at(x, y);
-                let [tr, tg, tb] = texture.mip(lod).rgb(uv, self.address());
-                [r * tr, g * tg, b * tb]
-            }
-        }
+        let Some(texture) = self.texture else {
+            return [r, g, b];
+        };
+        let uv = [self.u.at(at) / q, self.v.at(at) / q];
+        let lod = self.lod.unwrap_or_else(|| self.level(uv[0], uv[1], q));
+        let [tr, tg, tb] = texture.mip(lod).rgb(uv, self.address());
+        [r * tr, g * tg, b * tb]
     }
 }

@@ -2,12 +2,13 @@
 
 use glam::{Vec2, Vec3};
 
-use super::camera::Corner;
-use super::draw::{EMPTY, Items};
-use super::relief::{Bumps, Relief};
-use super::shade::{Light, Surface};
-use super::triangle::Triangle;
-use super::{Camera, Sampling, Scene};
+use super::draw::{EMPTY, Front};
+use super::pane::Panes;
+use super::relief::Relief;
+use super::shade::Light;
+use super::shader::{Shaded, Shader};
+use super::triangle::CENTER;
+use super::{Camera, Mask, Sampling, Scene};
 
 /// Pixels of a drawing, rows from the top. Everything is a mean over *all* samples of the pixel,
 /// so that what is covered in part counts in part, and pixels can be averaged.
@@ -27,128 +28,39 @@ pub struct Layers {
     pub distance: Vec<f32>,
 }
 
-/// Samples along a pixel's edge that are shaded, at most.
-const SHADED: usize = 4;
-
-/// Triangles that are ready to be shaded, at most.
-const KNOWN: usize = 1024;
-
-/// A triangle that is ready to be shaded.
-struct Known<'a> {
-    id: u32,
-    surface: Surface<'a>,
-    bumps: Option<Bumps<'a>>,
-}
-
-impl<'a> Known<'a> {
-    fn new(
-        scene: &Scene<'a>,
-        corners: &[Corner],
-        id: u32,
-        sampling: Sampling,
-        reliefs: &'a [Option<Relief<'a>>],
-    ) -> Option<Self> {
-        let indices = &scene.geometry.triangles[id as usize];
-        let at = indices.map(|i| corners[i as usize]);
-        let material = scene.geometry.triangle_material.get(id as usize);
-        let relief = reliefs.get(material.map_or(0, |&m| m as usize));
-        let bumps = relief.and_then(Option::as_ref).and_then(|relief| {
-            let triangle = Triangle::new(at, true)?;
-            Bumps::new(relief, scene, indices, at, &triangle)
+/// Draws where the scene is and how it looks. Of all samples that are hit 4 x 4 a pixel are shaded; where
+/// there are more they tell coverage alone. `reliefs` are the materials' normal maps, as many as materials or none.
+pub fn layers(
+    scene: &Scene,
+    camera: &Camera,
+    sampling: Sampling,
+    light: Light,
+    reliefs: &[Option<Relief>],
+) -> (Mask, Layers) {
+    let corners = camera.project(scene.geometry.positions, sampling.side);
+    let side = sampling.side as i32;
+    let size = [camera.width as i32 * side, camera.height as i32 * side];
+    let mut mask = Mask::empty(camera, sampling.side);
+    let mut layers = Layers::empty(camera.width, camera.height);
+    let mut samples = vec![0u32; layers.color.len()];
+    let mut shader = Shader::new(scene, &corners, sampling, light, reliefs);
+    let mut front = Front::default();
+    for (pane, ids) in Panes::new::<(f32, u32), 1>(scene, &corners, size, side, CENTER).each() {
+        front.draw(scene, &corners, sampling, &pane, ids);
+        for (y, items) in (pane.y[0]..).zip(front.items.chunks_exact(pane.width())) {
+            let at = y as usize * size[0] as usize + pane.x[0] as usize;
+            let hits = mask.samples[at..].iter_mut().zip(items);
+            hits.for_each(|(hit, &item)| *hit = u8::from(item != EMPTY));
+        }
+        shader.shade(&front, &pane, ids, |[x, y], seen| {
+            let pixel = (y / side * camera.width as i32 + x / side) as usize;
+            layers.add(pixel, &seen, camera.perspective);
+            samples[pixel] += 1;
         });
-        Some(Self {
-            id,
-            surface: Surface::new(scene, corners, id, sampling)?,
-            bumps,
-        })
     }
-
-    /// Linear base colour and unit normal at a sample.
-    fn at(&self, x: i32, y: i32) -> ([f32; 3], Vec3) {
-        let (albedo, normal) = self.surface.at(x, y);
-        let side = self.surface.side;
-        let bumped = self.bumps.as_ref();
-        (
-            albedo,
-            bumped.map_or(normal, |bumps| bumps.at(x, y, normal * side) * side),
-        )
-    }
-}
-
-impl Items {
-    /// Averages the samples of every pixel. Of all that are hit 4 x 4 are shaded; where there are
-    /// more they tell coverage alone. `reliefs` are the materials' normal maps, as many as materials.
-    ///
-    /// `scene`, `camera` and `sampling` must be those that the items were drawn with.
-    pub fn layers(
-        &self,
-        scene: &Scene,
-        camera: &Camera,
-        sampling: Sampling,
-        light: Light,
-        reliefs: &[Option<Relief>],
-    ) -> Layers {
-        let corners = camera.project(scene.geometry.positions, sampling.side);
-        let mut layers = Layers::empty(self.width, self.height);
-        // Rows of samples cross the same triangles as the rows above.
-        let mut known: Vec<Option<Known>> = (0..KNOWN).map(|_| None).collect();
-        let (side, row) = (self.side as usize, (self.width * self.side) as usize);
-        let mut shade = |layers: &mut Layers, sample: usize, pixel: usize| {
-            let id = self.triangle[sample];
-            let known = &mut known[id as usize % KNOWN];
-            if known.as_ref().is_none_or(|known| known.id != id) {
-                *known = Known::new(scene, &corners, id, sampling, reliefs);
-            }
-            let Some(known) = known else { return };
-            let (albedo, normal) = known.at((sample % row) as i32, (sample / row) as i32);
-            let near = self.near[sample];
-            let distance = if camera.perspective {
-                1.0 / near
-            } else {
-                -near
-            };
-            layers.add(pixel, albedo, light.on(normal), normal, distance);
-        };
-        // Which samples are shaded: all of 4 x 4, as many of more.
-        let stride = (side / SHADED).max(1);
-        let chosen = |at: usize| at % stride == stride / 2;
-        let mut shaded = vec![0u32; layers.coverage.len()];
-        for (y, ids) in self.triangle.chunks_exact(row).enumerate() {
-            let first = y / side * self.width as usize;
-            for (x, _) in ids.iter().enumerate().filter(|(_, id)| **id != EMPTY) {
-                let pixel = first + x / side;
-                layers.coverage[pixel] += 1.0;
-                if chosen(x) && chosen(y) {
-                    shade(&mut layers, y * row + x, pixel);
-                    shaded[pixel] += 1;
-                }
-            }
-        }
-        for (pixel, shaded) in shaded.into_iter().enumerate() {
-            let hits = layers.coverage[pixel];
-            let share = hits / (side * side) as f32;
-            if hits > 0.0 && shaded == 0 {
-                // None of the chosen ones: the first that is hit stands for all.
-                let (x, y) = (pixel % self.width as usize, pixel / self.width as usize);
-                let mut samples = (0..side * side)
-                    .map(|i| (y * side + i / side) * row + x * side + i % side)
-                    .filter(|&sample| self.triangle[sample] != EMPTY);
-                if let Some(sample) = samples.next() {
-                    shade(&mut layers, sample, pixel);
-                }
-            }
-            layers.weigh(pixel, share / shaded.max(1) as f32);
-            layers.coverage[pixel] = share;
-        }
-        for (pixel, distance) in layers.distance.iter_mut().enumerate() {
-            let at = Vec2::new(
-                (pixel % self.width as usize) as f32 + 0.5 - self.width as f32 / 2.0,
-                (pixel / self.width as usize) as f32 + 0.5 - self.height as f32 / 2.0,
-            );
-            *distance *= camera.slant(at - camera.shift);
-        }
-        layers
-    }
+    layers.coverage = mask.coverage().fraction;
+    layers.finish(camera, &samples);
+    (mask, layers)
 }
 
 impl Layers {
@@ -164,18 +76,29 @@ impl Layers {
         }
     }
 
-    fn add(&mut self, pixel: usize, albedo: [f32; 3], lit: f32, normal: Vec3, distance: f32) {
-        for (sum, value) in self.color[pixel].iter_mut().zip(albedo) {
-            *sum += value * lit;
+    /// Adds what is seen at a sample of a pixel.
+    fn add(&mut self, pixel: usize, seen: &Shaded, perspective: bool) {
+        for (sum, value) in self.color[pixel].iter_mut().zip(seen.light) {
+            *sum += value;
         }
-        self.normal[pixel] += normal;
-        self.distance[pixel] += distance;
+        self.normal[pixel] += seen.normal;
+        self.distance[pixel] += if perspective {
+            1.0 / seen.near
+        } else {
+            -seen.near
+        };
     }
 
-    /// Multiplies everything but coverage.
-    fn weigh(&mut self, pixel: usize, factor: f32) {
-        self.color[pixel].iter_mut().for_each(|c| *c *= factor);
-        self.normal[pixel] *= factor;
-        self.distance[pixel] *= factor;
+    /// From sums over so many samples of each pixel to means over all that it has.
+    fn finish(&mut self, camera: &Camera, samples: &[u32]) {
+        for (pixel, &samples) in samples.iter().enumerate() {
+            let share = self.coverage[pixel] / samples.max(1) as f32;
+            let (x, y) = (pixel % self.width as usize, pixel / self.width as usize);
+            let middle = Vec2::new(self.width as f32, self.height as f32) / 2.0;
+            let at = Vec2::new(x as f32 + 0.5, y as f32 + 0.5) - middle;
+            self.color[pixel].iter_mut().for_each(|c| *c *= share);
+            self.normal[pixel] *= share;
+            self.distance[pixel] *= share * camera.slant(at - camera.shift);
+        }
     }
 }

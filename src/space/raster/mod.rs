@@ -10,7 +10,8 @@
 //! coverage(scene, camera, sampling)       which samples are hit; no depth, no colour: fast
 //! coverage_multisampled(scene, camera)    the same as a page with four samples a pixel shows it
 //! critical(scene, camera, scores)         the alpha threshold at which each pixel is lost
-//! draw(scene, camera, sampling)           nearest triangle of every sample -> colour, normal, depth
+//! draw(scene, camera, sampling)           nearest triangle of every sample
+//! layers(scene, camera, sampling, ..)     what every pixel shows: coverage, light, normal, distance
 //! ```
 //!
 //! One call works on one thread and gives the same bits everywhere; callers spread views.
@@ -25,11 +26,13 @@ mod image;
 mod layers;
 mod mips;
 mod msaa;
+mod pane;
 mod piece;
 mod relief;
 mod row;
 mod seen;
 mod shade;
+mod shader;
 mod texture;
 mod tiles;
 mod triangle;
@@ -39,7 +42,7 @@ pub use coverage::{Coverage, Mask, Stats, coverage, coverage_with_stats};
 pub use critical::{Critical, ScorePage, Scores, critical};
 pub use draw::{EMPTY, Items, draw};
 pub use image::Picture;
-pub use layers::Layers;
+pub use layers::{Layers, layers};
 pub use msaa::{Multisampled, coverage_multisampled};
 pub use relief::Relief;
 pub use shade::{Light, linear_from_srgb, srgb_from_linear};

@@ -6,6 +6,7 @@
 
 use super::camera::SUBSAMPLES;
 use super::coverage::Coverage;
+use super::pane::Panes;
 use super::row::is_all;
 use super::seen::seen;
 use super::{Camera, Mips, Sampling, Scene};
@@ -56,13 +57,18 @@ impl Multisampled {
         let (width, height) = (self.width as i32, self.height as i32);
         let hits = &mut self.hits;
         let places = PLACES.map(|(x, y)| [x, y].map(|p| p * SUBSAMPLES / 16));
-        for shown in seen(scene, &corners, places) {
+        let panes = Panes::new::<u8, 4>(scene, &corners, [width, height], 1, places);
+        let all = panes.each().flat_map(|(pane, ids)| {
+            let seen = |&id| seen(scene, &corners, id);
+            ids.iter().filter_map(seen).map(move |shown| (pane, shown))
+        });
+        for (pane, shown) in all {
             let mut fragment = None;
-            shown.triangle.rows(width, height, places, |y, row| {
+            shown.triangle.rows(&pane, places, |y, row| {
                 let first = (y * width) as usize;
-                let (from, to) = row.reach();
+                let [from, to] = row.reach().map(|x| first + x as usize);
                 // Inside a crown most pixels are full: edges are not even looked at.
-                if is_all::<ALL>(&hits[first + from..first + to]) {
+                if is_all::<ALL>(&hits[from..to]) {
                     return;
                 }
                 let spans = row.spans();

@@ -4,6 +4,7 @@ use glam::{Vec2, Vec3};
 
 use super::Scene;
 use super::camera::Corner;
+use super::fragment::divisors;
 use super::texture::Wrap;
 use super::triangle::{Plane, Triangle};
 
@@ -29,21 +30,24 @@ pub(super) struct Bumps<'a> {
     relief: &'a Relief<'a>,
     u: Plane,
     v: Plane,
-    q: Plane,
     /// Where u grows, in model space.
     along: Vec3,
     /// Where v falls: the image's top.
     up: Vec3,
+    /// Both on the surface, where its normal is one.
+    axes: Option<[Vec3; 2]>,
 }
 
 impl<'a> Bumps<'a> {
-    /// `None` where texture coordinates don't vary over the triangle.
+    /// `None` where texture coordinates don't vary over the triangle; `normal` is its front's, where
+    /// that does not vary.
     pub fn new(
         relief: &'a Relief<'a>,
         scene: &Scene,
         indices: &[u32; 3],
         corners: [Corner; 3],
         triangle: &Triangle,
+        normal: Option<Vec3>,
     ) -> Option<Self> {
         let uvs = scene.geometry.uvs[relief.uv_set.min(1) as usize];
         if uvs.is_empty() {
@@ -57,34 +61,43 @@ impl<'a> Bumps<'a> {
         }
         let positions = scene.geometry.positions;
         let (p, r) = (positions[b] - positions[a], positions[c] - positions[a]);
-        let q = corners.map(|c| c.q);
+        let q = divisors(&corners);
         let over = |axis: usize| {
             triangle.plane(std::array::from_fn(|i| {
                 uvs[indices[i] as usize][axis] * q[i]
             }))
         };
-        Some(Self {
+        let mut bumps = Self {
             relief,
             u: over(0),
             v: over(1),
-            q: triangle.plane(q),
             along: (p * t.y - r * s.y) * turn.signum(),
             up: (p * t.x - r * s.x) * turn.signum(),
-        })
+            axes: None,
+        };
+        bumps.axes = normal.map(|normal| bumps.axes_under(normal));
+        Some(bumps)
     }
 
-    /// The mapped normal at a sample, where `normal` is the unit normal of the triangle's front.
-    pub fn at(&self, x: i32, y: i32, normal: Vec3) -> Vec3 {
-        let q = self.q.value(x, y);
-        let uv = Vec2::new(self.u.value(x, y), self.v.value(x, y)) / q;
+    /// The mapped normal at a place, where `normal` is the unit normal of the triangle's front and
+    /// texture coordinates are divided by `q`.
+    #[inline]
+    pub fn at(&self, at: [f32; 2], q: f32, normal: Vec3) -> Vec3 {
+        let uv = Vec2::new(self.u.at(at), self.v.at(at)) / q;
         let [r, g, b] = self.relief.texel(uv);
-        let tangent = (self.along - normal * normal.dot(self.along)).normalize_or_zero();
-        let mut bitangent = normal.cross(tangent);
-        if bitangent.dot(self.up) < 0.0 {
-            bitangent = -bitangent;
-        }
+        let [tangent, bitangent] = self.axes.unwrap_or_else(|| self.axes_under(normal));
         let scale = self.relief.scale;
         (tangent * (r * scale) + bitangent * (g * scale) + normal * b).normalize_or(normal)
+    }
+
+    /// Where the image's right and top are on a surface with this normal.
+    fn axes_under(&self, normal: Vec3) -> [Vec3; 2] {
+        let tangent = (self.along - normal * normal.dot(self.along)).normalize_or_zero();
+        let bitangent = normal.cross(tangent);
+        match bitangent.dot(self.up) < 0.0 {
+            true => [tangent, -bitangent],
+            false => [tangent, bitangent],
+        }
     }
 }
 

@@ -1,4 +1,4 @@
-//! The triangles of a scene that a drawing may show.
+//! A triangle that a drawing may show.
 
 use super::camera::Corner;
 use super::fragment::Fragment;
@@ -7,35 +7,24 @@ use super::{Material, Sampling, Scene};
 
 /// What drawing needs of one triangle.
 pub(super) struct Seen<'s> {
-    /// Its number in the scene.
-    pub id: usize,
     pub corners: [Corner; 3],
     pub material: &'s Material,
     pub triangle: Triangle,
     indices: &'s [u32; 3],
 }
 
-/// The triangles that may hit a sample at one of `places` and face the eye, in order; `corners` are
-/// the scene's positions, projected.
-pub(super) fn seen<'s, const N: usize>(
-    scene: &'s Scene<'s>,
-    corners: &'s [Corner],
-    places: [[i32; 2]; N],
-) -> impl Iterator<Item = Seen<'s>> {
-    let all = scene.geometry.triangles.iter().enumerate();
-    all.filter_map(move |(id, indices)| {
-        let at: [Corner; 3] = indices.map(|i| corners[i as usize]);
-        if !Triangle::may_hit(&at, places) {
-            return None;
-        }
-        let material = scene.material(id);
-        Some(Seen {
-            id,
-            corners: at,
-            material,
-            triangle: Triangle::new(at, material.double_sided)?,
-            indices,
-        })
+/// A triangle, unless it turns its culled back to the eye or is empty; `corners` are the scene's
+/// positions, projected.
+#[inline]
+pub(super) fn seen<'s>(scene: &'s Scene<'s>, corners: &[Corner], id: u32) -> Option<Seen<'s>> {
+    let indices = &scene.geometry.triangles[id as usize];
+    let at: [Corner; 3] = indices.map(|i| corners[i as usize]);
+    let material = scene.material(id as usize);
+    Some(Seen {
+        corners: at,
+        material,
+        triangle: Triangle::new(at, material.double_sided)?,
+        indices,
     })
 }
 

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::draw::{EMPTY, Items};
-use super::fragment::Fragment;
+use super::fragment::{Fragment, divisors};
 use super::image::Picture;
 use super::triangle::{Plane, Triangle};
 use super::{Camera, Sampling, Scene};
@@ -52,7 +52,7 @@ pub fn srgb_from_linear(value: f32) -> f32 {
 /// A triangle whose values are read at several samples.
 pub(super) struct Surface<'a> {
     fragment: Fragment<'a>,
-    normal: Option<[Plane; 3]>,
+    normal: Normal,
     color: Option<[Plane; 3]>,
     q: Plane,
     /// Minus one where the back is seen: its normal points the other way.
@@ -104,7 +104,7 @@ impl Items {
             let Some((_, surface)) = &cached else {
                 continue;
             };
-            let (albedo, normal) = surface.at(x as i32, y as i32);
+            let (albedo, normal, _) = surface.at([x as f32, y as f32]);
             let lit = light.on(normal);
             for (sum, value) in picture.color[pixel].iter_mut().zip(albedo) {
                 *sum += value * lit;
@@ -140,16 +140,22 @@ impl<'a> Surface<'a> {
         let indices = &scene.geometry.triangles[id as usize];
         let at = indices.map(|i| corners[i as usize]);
         let triangle = Triangle::new(at, material.double_sided)?;
-        let q = at.map(|c| c.q);
+        let q = divisors(&at);
         let over = |values: [Vec3; 3]| {
             let axis =
                 |axis: usize| triangle.plane(std::array::from_fn(|i| values[i][axis] * q[i]));
             [axis(0), axis(1), axis(2)]
         };
         let (normals, colors) = (scene.geometry.normals, scene.geometry.colors);
+        let side = if triangle.front { 1.0 } else { -1.0 };
+        let normal = match indices.map(|i| normals.get(i as usize)) {
+            [Some(a), Some(b), Some(c)] if a != b || b != c => Normal::Varies(over([*a, *b, *c])),
+            [Some(a), ..] => Normal::Same(a.normalize_or(Vec3::Y) * side),
+            _ => Normal::Same(Vec3::Y),
+        };
         Some(Self {
             fragment: Fragment::new(scene, material, indices, &at, &triangle, sampling),
-            normal: (!normals.is_empty()).then(|| over(indices.map(|i| normals[i as usize]))),
+            normal,
             color: (!colors.is_empty()).then(|| {
                 over(indices.map(|i| {
                     let [r, g, b, _] = colors[i as usize];
@@ -157,24 +163,40 @@ impl<'a> Surface<'a> {
                 }))
             }),
             q: triangle.plane(q),
-            side: if triangle.front { 1.0 } else { -1.0 },
+            side,
         })
     }
 
-    /// Linear base colour and unit normal at a sample.
-    pub fn at(&self, x: i32, y: i32) -> ([f32; 3], Vec3) {
-        let q = self.q.value(x, y);
-        let value = |planes: &[Plane; 3]| {
-            Vec3::from_array(std::array::from_fn(|i| planes[i].value(x, y))) / q
+    /// Linear base colour and unit normal at a place, and what its values were divided by.
+    #[inline]
+    pub fn at(&self, at: [f32; 2]) -> ([f32; 3], Vec3, f32) {
+        let q = self.q.at(at);
+        let value = |planes: &[Plane; 3]| Vec3::from_array(planes.each_ref().map(|p| p.at(at)));
+        let normal = match &self.normal {
+            Normal::Same(normal) => *normal,
+            // Its length does not matter, nor does what it is divided by.
+            Normal::Varies(planes) => value(planes).normalize_or(Vec3::Y) * self.side,
         };
-        let normal = self.normal.as_ref().map_or(Vec3::Y, |planes| {
-            value(planes).normalize_or(Vec3::Y) * self.side
-        });
-        let mut albedo = self.fragment.albedo(x, y);
+        let mut albedo = self.fragment.albedo(at, q);
         if let Some(planes) = &self.color {
-            let tint = value(planes);
+            let tint = value(planes) / q;
             albedo = [albedo[0] * tint.x, albedo[1] * tint.y, albedo[2] * tint.z];
         }
-        (albedo, normal)
+        (albedo, normal, q)
     }
+
+    /// The normal of all of the triangle, where it is one.
+    pub fn normal(&self) -> Option<Vec3> {
+        match self.normal {
+            Normal::Same(normal) => Some(normal),
+            Normal::Varies(_) => None,
+        }
+    }
+}
+
+/// Unit normals of a triangle, on the side that is seen.
+enum Normal {
+    Same(Vec3),
+    /// Towards its front.
+    Varies([Plane; 3]),
 }

@@ -4,19 +4,25 @@
 //! nearness, everything farther is passed over after a look at its corners (a hierarchical z-buffer:
 //! Greene, Kass and Miller, SIGGRAPH 1993, of one level). The picture is the same with and without.
 
-use super::camera::{Corner, SUBSAMPLES};
+use std::ops::Range;
+
+use super::pane::Pane;
+use super::triangle::{Plane, Triangle};
 
 /// Edge of a tile in samples, as a power of two.
-const SHIFT: i32 = 4;
+const SHIFT: i32 = 3;
 /// Edge of a tile in samples.
-const SIDE: usize = 1 << SHIFT;
-/// A triangle over more tiles than this, along either axis, is drawn without being asked.
-const MOST_TILES: i32 = 3;
+const SIDE: i32 = 1 << SHIFT;
 /// A tile is looked at again after so many triangles.
-const PATIENCE: u16 = 32;
+const PATIENCE: u16 = 8;
+/// Over more tiles than this, along either axis, a triangle's nearness is asked tile by tile.
+const FEW_TILES: i32 = 2;
 
-/// Tiles of a picture.
+/// Tiles of a pane.
+#[derive(Default)]
 pub(super) struct Tiles {
+    /// The pane's first column and row.
+    origin: [i32; 2],
     across: usize,
     width: usize,
     height: usize,
@@ -27,65 +33,93 @@ pub(super) struct Tiles {
 }
 
 impl Tiles {
-    /// Of an empty picture of so many samples.
-    pub fn new(width: i32, height: i32) -> Self {
-        let (width, height) = (width as usize, height as usize);
-        let (across, down) = (width.div_ceil(SIDE), height.div_ceil(SIDE));
-        Self {
-            across,
-            width,
-            height,
-            bound: vec![f32::NEG_INFINITY; across * down],
-            since: vec![0; across * down],
+    /// Starts with an empty pane.
+    pub fn clear(&mut self, pane: &Pane) {
+        (self.width, self.height) = (pane.width(), pane.height());
+        let side = SIDE as usize;
+        let (across, down) = (self.width.div_ceil(side), self.height.div_ceil(side));
+        self.origin = [pane.x[0], pane.y[0]];
+        self.across = across;
+        self.bound.clear();
+        self.bound.resize(across * down, f32::NEG_INFINITY);
+        self.since.clear();
+        self.since.resize(across * down, 0);
+    }
+
+    /// Calls `draw` for parts of the pane that hold all of the triangle that is not hidden. `nearest`
+    /// is the nearness of its nearest corner, `near` how it varies; `samples` is the pane's, and
+    /// `least` tells the least nearness of some.
+    #[inline]
+    pub fn visible<T>(
+        &mut self,
+        triangle: &Triangle,
+        pane: &Pane,
+        (nearest, near): (f32, impl Fn() -> Plane),
+        samples: &mut [T],
+        least: impl Fn(&[T]) -> f32,
+        mut draw: impl FnMut(&Pane, &mut [T]),
+    ) {
+        let Some([xs, ys]) = triangle.reach(pane) else {
+            return;
+        };
+        let tile = |axis: usize, at: i32| (at - self.origin[axis]) >> SHIFT;
+        let ([x0, x1], [y0, y1]) = (xs.map(|x| tile(0, x)), ys.map(|y| tile(1, y)));
+        let near = (x1 - x0 >= FEW_TILES || y1 - y0 >= FEW_TILES).then(near);
+        for y in y0..=y1 {
+            let mut shown = [i32::MAX, i32::MIN];
+            for x in x0..=x1 {
+                let first = [x, y].map(|t| t << SHIFT);
+                let first = [first[0] + self.origin[0], first[1] + self.origin[1]];
+                let nearest = near.map_or(nearest, |near| near.highest(first, SIDE).min(nearest));
+                if !self.hides([x, y], nearest, |range| least(&samples[range])) {
+                    shown = [shown[0].min(x), x + 1];
+                }
+            }
+            if shown[0] < shown[1] {
+                let part = Pane {
+                    x: self.clipped(0, shown, pane.x),
+                    y: self.clipped(1, [y, y + 1], pane.y),
+                };
+                draw(&part, samples);
+            }
         }
     }
 
-    /// Whether a triangle whose nearest corner is at `nearest` is hidden in all tiles that it
-    /// touches; `least` tells the least nearness of samples `from..to` of the picture.
+    /// Samples of tiles along an axis.
+    fn clipped(&self, axis: usize, tiles: [i32; 2], pane: [i32; 2]) -> [i32; 2] {
+        let [from, to] = tiles.map(|t| self.origin[axis] + (t << SHIFT));
+        [from, to.min(pane[1])]
+    }
+
     #[inline]
-    pub fn hide(
+    fn hides(
         &mut self,
-        corners: &[Corner; 3],
+        [x, y]: [i32; 2],
         nearest: f32,
-        least: impl Fn(std::ops::Range<usize>) -> f32,
+        least: impl Fn(Range<usize>) -> f32,
     ) -> bool {
-        let [a, b, c] = corners;
-        let tile = |sub_samples: i32| sub_samples >> (SHIFT + SUBSAMPLES.trailing_zeros() as i32);
-        let (x0, x1) = (tile(a.x.min(b.x).min(c.x)), tile(a.x.max(b.x).max(c.x)));
-        let (y0, y1) = (tile(a.y.min(b.y).min(c.y)), tile(a.y.max(b.y).max(c.y)));
-        if x1 - x0 >= MOST_TILES || y1 - y0 >= MOST_TILES {
+        let tile = y as usize * self.across + x as usize;
+        if self.bound[tile] >= nearest {
+            return true;
+        }
+        self.since[tile] += 1;
+        if self.since[tile] < PATIENCE {
             return false;
         }
-        let down = (self.bound.len() / self.across.max(1)) as i32;
-        for y in y0.max(0)..=y1.min(down - 1) {
-            for x in x0.max(0)..=x1.min(self.across as i32 - 1) {
-                let tile = y as usize * self.across + x as usize;
-                if self.bound[tile] >= nearest {
-                    continue;
-                }
-                self.since[tile] += 1;
-                if self.since[tile] < PATIENCE {
-                    return false;
-                }
-                self.since[tile] = 0;
-                self.bound[tile] = self.look(x as usize * SIDE, y as usize * SIDE, &least);
-                if self.bound[tile] < nearest {
-                    return false;
-                }
-            }
-        }
-        true
+        self.since[tile] = 0;
+        self.bound[tile] = self.look((x << SHIFT) as usize, (y << SHIFT) as usize, least);
+        self.bound[tile] >= nearest
     }
 
     /// The least nearness of a tile's samples.
-    fn look(&self, x: usize, y: usize, least: impl Fn(std::ops::Range<usize>) -> f32) -> f32 {
-        let rows = y..(y + SIDE).min(self.height);
-        let columns = x..(x + SIDE).min(self.width);
+    fn look(&self, x: usize, y: usize, least: impl Fn(Range<usize>) -> f32) -> f32 {
+        let side = SIDE as usize;
+        let rows = y..(y + side).min(self.height);
+        let columns = x..(x + side).min(self.width);
         let mut found = f32::INFINITY;
         for row in rows {
-            found = found.min(least(
-                row * self.width + columns.start..row * self.width + columns.end,
-            ));
+            let first = row * self.width;
+            found = found.min(least(first + columns.start..first + columns.end));
             if found == f32::NEG_INFINITY {
                 break;
             }

@@ -5,6 +5,7 @@
 //! sample on it, so a closed mesh has neither holes nor double hits.
 
 use super::camera::{Corner, SUBSAMPLES};
+use super::pane::Pane;
 
 /// A triangle ready to be scanned; corners run clockwise on the screen (y down).
 pub(super) struct Triangle {
@@ -34,6 +35,12 @@ impl Plane {
         self.row(y).value(x)
     }
 
+    /// At a place between samples.
+    #[inline]
+    pub fn at(&self, [x, y]: [f32; 2]) -> f32 {
+        self.at + self.dy * (y - self.y0) + self.dx * (x - self.x0)
+    }
+
     /// The values of a row.
     pub fn row(&self, y: i32) -> Row {
         Row {
@@ -41,6 +48,19 @@ impl Plane {
             dx: self.dx,
             x0: self.x0,
         }
+    }
+}
+
+impl Plane {
+    /// No less than any value in a square with so many samples along an edge from `x`, `y` on.
+    #[inline]
+    pub fn highest(&self, [x, y]: [i32; 2], edge: i32) -> f32 {
+        let across = self.dx * (x as f32 - self.x0);
+        let down = self.dy * (y as f32 - self.y0);
+        let within = (self.dx.max(0.0) + self.dy.max(0.0)) * (edge - 1) as f32;
+        // Each of these terms, and so the sum, is rounded.
+        let size = self.at.abs() + across.abs() + down.abs() + within;
+        self.at + across + down + within + size * 4.0 * f32::EPSILON
     }
 }
 
@@ -86,22 +106,6 @@ impl Triangle {
         })
     }
 
-    /// Whether any sample may be inside: most triangles of a far tree lie between all samples, and
-    /// this is all that they cost. `places` are those of [`Triangle::rows`].
-    pub fn may_hit<const N: usize>(corners: &[Corner; 3], places: [[i32; 2]; N]) -> bool {
-        let [a, b, c] = corners;
-        let (x0, x1) = (a.x.min(b.x).min(c.x), a.x.max(b.x).max(c.x));
-        let (y0, y1) = (a.y.min(b.y).min(c.y), a.y.max(b.y).max(c.y));
-        // Whether there is a whole number k with low <= 256 k + place <= high.
-        let between = |low: i32, high: i32, place: i32| {
-            high.saturating_sub(place).div_euclid(SUBSAMPLES)
-                > low.saturating_sub(place + 1).div_euclid(SUBSAMPLES)
-        };
-        places
-            .iter()
-            .any(|&[x, y]| between(x0, x1, x) && between(y0, y1, y))
-    }
-
     /// How a quantity with these values at the model's corners varies over the screen.
     pub fn plane(&self, values: [f32; 3]) -> Plane {
         let [a, b, c] = &self.corners;
@@ -124,9 +128,14 @@ impl Triangle {
         self.plane(corners.map(|c| c.near))
     }
 
+    /// The first and last column, and row, of a pane that may have samples inside, if any.
+    pub fn reach(&self, pane: &Pane) -> Option<[[i32; 2]; 2]> {
+        reach(&self.corners, pane, CENTER)
+    }
+
     /// Calls `span(y, from, to)` for every row with samples `from..to` inside.
-    pub fn scan(&self, width: i32, height: i32, mut span: impl FnMut(i32, i32, i32)) {
-        self.rows(width, height, CENTER, |y, row| {
+    pub fn scan(&self, pane: &Pane, mut span: impl FnMut(i32, i32, i32)) {
+        self.rows(pane, CENTER, |y, row| {
             let [(from, to)] = row.spans();
             if from < to {
                 span(y, from, to);
@@ -134,35 +143,21 @@ impl Triangle {
         });
     }
 
-    /// Calls `row(y, ..)` for every row that the triangle may reach, with samples at several `places`
-    /// of each pixel, in sub-samples from its left upper corner. Who needs nothing of a row does not ask
-    /// for its spans, and saves most of what it costs.
+    /// Calls `row(y, ..)` for every row of a pane that the triangle may reach, with samples at several
+    /// `places` of each pixel, in sub-samples from its left upper corner. Who needs nothing of a row
+    /// does not ask for its spans, and saves most of what it costs.
     pub fn rows<const N: usize>(
         &self,
-        width: i32,
-        height: i32,
+        pane: &Pane,
         places: [[i32; 2]; N],
         mut row: impl FnMut(i32, &mut Spans<N>),
     ) {
-        let [a, b, c] = &self.corners;
-        let ends = |axis: usize, values: [i32; 3], size: i32| {
-            let [low, high] =
-                [values.iter().min(), values.iter().max()].map(|v| v.map_or(0, |v| *v));
-            let least = places.iter().map(|p| p[axis]).min().unwrap_or(0);
-            let most = places.iter().map(|p| p[axis]).max().unwrap_or(0);
-            (
-                (low - most + SUBSAMPLES - 1).div_euclid(SUBSAMPLES).max(0),
-                (high - least).div_euclid(SUBSAMPLES).min(size - 1),
-            )
-        };
-        let (x0, x1) = ends(0, [a.x, b.x, c.x], width);
-        let (y0, y1) = ends(1, [a.y, b.y, c.y], height);
-        if x0 > x1 || y0 > y1 {
+        let Some([x, [y0, y1]]) = reach(&self.corners, pane, places) else {
             return;
-        }
+        };
         let mut spans = Spans {
             triangle: self,
-            x: [x0, x1],
+            x,
             y: [y0, y0],
             places,
             edges: None,
@@ -172,6 +167,47 @@ impl Triangle {
             row(y, &mut spans);
         }
     }
+}
+
+/// The first and last column, and row, of a pane that may have samples inside; `None` where none
+/// has: most triangles of a far tree lie between all samples, and this is all that they cost.
+pub(super) fn reach<const N: usize>(
+    corners: &[Corner; 3],
+    pane: &Pane,
+    places: [[i32; 2]; N],
+) -> Option<[[i32; 2]; 2]> {
+    let [a, b, c] = corners;
+    if a.is_outside() || b.is_outside() || c.is_outside() {
+        return None;
+    }
+    let ends = |axis: usize, values: [i32; 3], [first, end]: [i32; 2]| {
+        let low = values[0].min(values[1]).min(values[2]);
+        let high = values[0].max(values[1]).max(values[2]);
+        // Whole numbers k with low <= 256 k + place <= high, of all places.
+        let most = places.iter().fold(i32::MIN, |m, p| m.max(p[axis]));
+        let least = places.iter().fold(i32::MAX, |m, p| m.min(p[axis]));
+        let from = (low - most + SUBSAMPLES - 1).div_euclid(SUBSAMPLES);
+        let to = (high - least).div_euclid(SUBSAMPLES);
+        [from.max(first), to.min(end - 1)]
+    };
+    let x = ends(0, [a.x, b.x, c.x], pane.x);
+    let y = ends(1, [a.y, b.y, c.y], pane.y);
+    (x[0] <= x[1] && y[0] <= y[1]).then_some([x, y])
+}
+
+/// Whether any of several places of a pixel may be inside, each asked for itself.
+pub(super) fn may_hit<const N: usize>(corners: &[Corner; 3], places: [[i32; 2]; N]) -> bool {
+    let [a, b, c] = corners;
+    let (x0, x1) = (a.x.min(b.x).min(c.x), a.x.max(b.x).max(c.x));
+    let (y0, y1) = (a.y.min(b.y).min(c.y), a.y.max(b.y).max(c.y));
+    // Whether there is a whole number k with low <= 256 k + place <= high.
+    let between = |low: i32, high: i32, place: i32| {
+        high.saturating_sub(place).div_euclid(SUBSAMPLES)
+            > low.saturating_sub(place + 1).div_euclid(SUBSAMPLES)
+    };
+    places
+        .iter()
+        .any(|&[x, y]| between(x0, x1, x) && between(y0, y1, y))
 }
 
 /// A row of a triangle with `N` samples a pixel.
@@ -189,8 +225,8 @@ pub(super) struct Spans<'t, const N: usize> {
 impl<const N: usize> Spans<'_, N> {
     /// The pixels `from..to` outside of which nothing is inside.
     #[inline]
-    pub fn reach(&self) -> (usize, usize) {
-        (self.x[0] as usize, self.x[1] as usize + 1)
+    pub fn reach(&self) -> [i32; 2] {
+        [self.x[0], self.x[1] + 1]
     }
 
     /// For each place the pixels `from..to` whose sample there is inside; equal ends: none.

@@ -4,7 +4,7 @@ use glam::Vec3;
 use pleach::botany::Model;
 use pleach::report::Drawable;
 use pleach::space::raster::{
-    Camera, Geometry, Layers, Light, Material, Sampling, Scene, draw, srgb_from_linear,
+    Camera, Geometry, Layers, Light, Material, Sampling, Scene, layers, srgb_from_linear,
 };
 
 /// A model that can be painted from anywhere.
@@ -53,8 +53,8 @@ impl<'m> Painter<'m> {
             materials: &self.materials,
             ..scene
         };
-        let items = draw(&scene, camera, Sampling::REFERENCE);
-        rgba(&items.layers(&scene, camera, Sampling::REFERENCE, Light::Unlit, &[]))
+        let (_, layers) = layers(&scene, camera, Sampling::REFERENCE, Light::Unlit, &[]);
+        rgba(&layers)
     }
 }
 
