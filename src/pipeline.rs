@@ -27,7 +27,7 @@ use crate::provenance::check_name;
 pub use crate::provenance::provenance;
 use crate::recipe::Method;
 use crate::report::schema::Report;
-use crate::report::{Judged, Making, Recognised, Settings, heights, judge};
+use crate::report::{Cuts, Judged, Recognised, Settings, heights, judge};
 pub use crate::request::Request;
 use crate::scene::Scene;
 use crate::sharing;
@@ -43,8 +43,8 @@ pub struct Baked {
     pub report: Report,
     /// The package's files, the manifest last.
     pub files: Vec<String>,
-    /// How the levels were chosen, where a page was asked for.
-    pub making: Making,
+    /// Pictures of what was recognised, where a page was asked for.
+    pub recognised: Vec<Recognised>,
     /// What was repaired, guessed or, by `accept`, tolerated.
     pub warnings: Vec<String>,
 }
@@ -133,6 +133,7 @@ fn made(request: &Request, watch: &dyn Watch) -> Result<Baked> {
         sharing: Some(sharing),
         instancing,
         hierarchy: tiles.as_ref().map(told),
+        cuts: Some(cuts(candidates, &levels)),
         ..report
     };
     if request.recipe.instancing {
@@ -144,9 +145,9 @@ fn made(request: &Request, watch: &dyn Watch) -> Result<Baked> {
         return Err(refusal(&found, &beside));
     }
     warnings.extend(found.into_iter().map(|f| f.what));
-    let making = match request.page {
-        true => making(&tree, candidates, &levels)?,
-        false => Making::default(),
+    let recognised = match request.page {
+        true => recognised(&tree)?,
+        false => Vec::new(),
     };
     let manifest = Manifest {
         provenance,
@@ -162,27 +163,33 @@ fn made(request: &Request, watch: &dyn Watch) -> Result<Baked> {
     Ok(Baked {
         report,
         files,
-        making,
+        recognised,
         warnings,
     })
 }
 
-fn making(tree: &Tree, candidates: Vec<Candidate>, levels: &Manifest) -> Result<Making> {
-    let chosen = levels.levels.iter().skip(1).map(|level| Candidate {
+fn cuts(best: Vec<Candidate>, made: &Manifest) -> Cuts {
+    let levels = made.levels.iter().skip(1).map(|level| Candidate {
         triangles: level.triangles,
         error_m: level.error_m,
     });
-    let recognised = portrait::all(tree)?.into_iter();
-    Ok(Making {
-        candidates,
-        chosen: chosen.collect(),
-        recognised: recognised
-            .map(|(name, png)| Recognised {
-                name: name.into(),
-                png,
-            })
-            .collect(),
-    })
+    Cuts {
+        best,
+        levels: levels.collect(),
+    }
+}
+
+/// Pictures of what is seen in a tree.
+///
+/// # Errors
+/// Where a picture can't be encoded, which would be a fault of ours.
+pub fn recognised(tree: &Tree) -> Result<Vec<Recognised>> {
+    let pictures = portrait::all(tree)?.into_iter();
+    let named = pictures.map(|(name, png)| Recognised {
+        name: name.into(),
+        png,
+    });
+    Ok(named.collect())
 }
 
 /// All levels, level 0 first, and what is told of them.
@@ -296,10 +303,7 @@ fn levels(
     part(watch, "encode")?;
     encode_images_of(&mut last)?;
     packed.push(last);
-    let candidates = match request.page {
-        true => baker.candidates(tree.model.frame.radius),
-        false => Vec::new(),
-    };
+    let candidates = baker.candidates(tree.model.frame.radius);
     Ok(Levels {
         packed,
         manifest,

@@ -22,7 +22,7 @@ pub struct Request {
     pub recipe: Recipe,
     /// The screen that levels are for.
     pub scene: Scene,
-    /// Whether to keep what a page on the bake shows: [`Baked::making`](crate::pipeline::Baked::making).
+    /// Whether to keep what a page on the bake shows: [`Baked::recognised`](crate::pipeline::Baked::recognised).
     pub page: bool,
     /// Whether to write into a folder that holds other files.
     pub force: bool,

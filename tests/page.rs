@@ -73,6 +73,39 @@ fn the_page_shows_cuts_skeleton_time_and_bytes_and_leaves_the_package_as_it_is()
 }
 
 #[test]
+fn evaluating_a_package_shows_the_cuts_it_was_chosen_from_and_another_tools_level_has_none() {
+    let home = tempfile::tempdir().unwrap();
+    let options = Options {
+        leaves: Some(200),
+        ..Options::default()
+    };
+    let grown = grow(&Species::named("palm").unwrap(), &options).unwrap();
+    std::fs::write(home.path().join("tree.glb"), grown.glb).unwrap();
+    std::fs::write(home.path().join("small.ron"), "(first_height_px: 64)").unwrap();
+    assert!(bake(home.path(), "out", &[]).status.success());
+    let evaluate = |level: &str, folder: &str| {
+        let done = Command::new(env!("CARGO_BIN_EXE_pleach"))
+            .args(["evaluate", "tree.glb", level, "-o", folder])
+            .args(["--height", "32", "--views", "3", "--elevations", "0"])
+            .current_dir(home.path())
+            .output()
+            .unwrap();
+        assert!(done.status.success());
+        std::fs::read_to_string(home.path().join(folder).join("report.html")).unwrap()
+    };
+    let ours = evaluate("out/tree_LOD1.glb", "ours");
+    assert!(ours.matches("best cut: ").count() > 10);
+    assert_eq!(ours.matches("<title>level: ").count(), 1);
+    let theirs = evaluate("tree.glb", "theirs");
+    assert!(!theirs.contains("best cut"));
+    for page in [ours, theirs] {
+        for text in ["Recognised: skeleton", "Where the time went", "recognise"] {
+            assert!(page.contains(text), "{text}");
+        }
+    }
+}
+
+#[test]
 fn a_bake_that_fails_leaves_no_page() {
     let home = tempfile::tempdir().unwrap();
     std::fs::write(home.path().join("tree.glb"), "no tree").unwrap();

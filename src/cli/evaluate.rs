@@ -1,15 +1,21 @@
 //! `pleach evaluate`: figures and pictures of levels against their original, from the files.
 
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
 use super::out::print;
 use crate::botany::Model;
 use crate::botany::load::load;
+use crate::botany::recognise::{RecogniseOptions, recognise};
 use crate::error::{Error, Result};
-use crate::report::schema::{Figure, Level, Report, SizeFigures};
-use crate::report::{Content, Settings, Start, contact_sheet, evaluate, start};
+use crate::pipeline::recognised;
+use crate::report::schema::{Bake, Figure, Level, Report, SizeFigures};
+use crate::report::{
+    Content, Cuts, Made, Recognised, Settings, Start, contact_sheet, evaluate, start,
+};
 use crate::space::raster::Sampling;
 use crate::space::view::{Lens, View};
+use crate::watch::{Clock, Unwatched, begin};
 
 /// Measures levels of detail against their original; takes any glTF, also another tool's.
 #[derive(clap::Args, Debug)]
@@ -66,6 +72,9 @@ fn parse_elevation(text: &str) -> std::result::Result<f32, String> {
 
 /// Runs the command.
 pub fn run(args: &Args) -> Result<()> {
+    let started = Instant::now();
+    let clock = Clock::new(Unwatched);
+    begin(&clock, "load", 1)?;
     let original = load(&args.original)?;
     let (files, mut own_heights_px) = split(&args.levels);
     let told: Vec<Start> = files.iter().map(|file| start(file)).collect();
@@ -93,14 +102,48 @@ pub fn run(args: &Args) -> Result<()> {
         .zip(&names)
         .map(|(m, n)| (m, n.as_str()))
         .collect();
-    let report = evaluate((&original, &file_name(&args.original)), &named, &settings);
+    begin(&clock, "measure", 1)?;
+    let measured = evaluate((&original, &file_name(&args.original)), &named, &settings);
+    let sizes = levels.iter().map(|model| model.triangles.len() as u64);
+    let baked: Vec<(&Path, u64)> = files.iter().map(PathBuf::as_path).zip(sizes).collect();
+    let report = Report {
+        cuts: Cuts::beside(&baked),
+        ..measured
+    };
     if let Some(folder) = &args.output {
-        write(folder, &report, &original, &levels, &settings)?;
+        begin(&clock, "recognise", 1)?;
+        let recognised = recognised_in(&args.original)?;
+        let stages = clock.finish();
+        let took = Bake {
+            seconds: started.elapsed().as_secs_f64(),
+            peak_bytes: stages.iter().map(|s| s.peak_bytes).max().filter(|&b| b > 0),
+            stages,
+        };
+        let sizes = [&args.original].into_iter().chain(&files).map(|file| {
+            let about = std::fs::metadata(file).map_err(|e| Error::io(file, "read", e))?;
+            Ok((file_name(file), about.len()))
+        });
+        let made = Made {
+            title: "Behind the figures",
+            recognised: &recognised,
+            took: &took,
+            files: &sizes.collect::<Result<Vec<_>>>()?,
+        };
+        write(folder, &report, (&original, &levels), &settings, made)?;
     }
     if args.json {
         print(&(to_json(&report)? + "\n"))
     } else {
         print(&table(&report))
+    }
+}
+
+/// Pictures of what a bake would see in the original; none where that is no tree.
+fn recognised_in(original: &Path) -> Result<Vec<Recognised>> {
+    match recognise(load(original)?, &RecogniseOptions::default()) {
+        Ok(tree) => recognised(&tree),
+        Err(Error::Input { .. }) => Ok(Vec::new()),
+        Err(error) => Err(error),
     }
 }
 
@@ -140,9 +183,9 @@ fn to_json(report: &Report) -> Result<String> {
 fn write(
     folder: &Path,
     report: &Report,
-    original: &Model,
-    levels: &[Model],
+    (original, levels): (&Model, &[Model]),
     settings: &Settings,
+    made: Made,
 ) -> Result<()> {
     std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, "create", e))?;
     let file = folder.join("report.json");
@@ -156,7 +199,7 @@ fn write(
         levels: &models,
         views: &settings.view_set(),
         lens: settings.lens,
-        made: None,
+        made: Some(made),
     };
     let file = folder.join("report.html");
     std::fs::write(&file, page.html()?).map_err(|e| Error::io(&file, "write", e))?;

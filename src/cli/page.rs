@@ -47,6 +47,7 @@ pub fn write(request: &Request, baked: &Baked, took: &Bake) -> Result<PathBuf> {
     let file = request.input.file_name().unwrap_or_default();
     let report = Report {
         sharing: baked.report.sharing.clone(),
+        cuts: baked.report.cuts.clone(),
         ..evaluate((&original, &file.to_string_lossy()), &named, &settings)
     };
     let files: Vec<(String, u64)> = baked
@@ -66,7 +67,8 @@ pub fn write(request: &Request, baked: &Baked, took: &Bake) -> Result<PathBuf> {
         views: &settings.view_set(),
         lens: settings.lens,
         made: Some(Made {
-            making: &baked.making,
+            title: "How they were made",
+            recognised: &baked.recognised,
             took,
             files: &files,
         }),

@@ -5,6 +5,8 @@
 //! into each other (Breiman, Friedman, Olshen and Stone 1984; Chou, Lookabaugh and Gray 1989).
 //! A budget is met by bisecting l; cuts lie on the lower convex hull of error against cost.
 
+use serde::{Deserialize, Serialize};
+
 use super::merge::Hierarchy;
 
 /// One way to represent an element other than by a card: for wood, a tube.
@@ -37,7 +39,7 @@ pub struct Cut {
 }
 
 /// What a cut costs, and how far off it is.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Candidate {
     /// Triangles, wood included.
     pub triangles: u64,

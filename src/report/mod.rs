@@ -6,6 +6,7 @@
 pub mod band;
 mod contact;
 mod cost;
+mod cuts;
 mod drawable;
 mod evaluate;
 mod flip;
@@ -23,10 +24,11 @@ mod start;
 
 pub use contact::contact_sheet;
 pub use cost::{draw_calls, texture_bytes};
+pub use cuts::Cuts;
 pub use drawable::Drawable;
 pub use evaluate::{Settings, evaluate};
 pub use judge::{Judged, heights, judge};
-pub use page::{Content, Made, Making, Recognised};
+pub use page::{Content, Made, Recognised};
 pub use reference::Reference;
 pub use silhouette::{Agreement, agreement};
 pub use start::{Start, start};

@@ -5,6 +5,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::cuts::Cuts;
+
 /// Everything that was measured.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Report {
@@ -30,6 +32,9 @@ pub struct Report {
     /// The hierarchy of sub-trees; absent where it was not asked for.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub hierarchy: Option<Hierarchy>,
+    /// The cuts that the levels were chosen from; absent where that is not known.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub cuts: Option<Cuts>,
     /// What the bake itself took: in the output of `bake --json` alone. It is absent from
     /// `report.json`, because a package is the same byte for byte on every run.
     #[serde(skip_serializing_if = "Option::is_none", default)]

@@ -54,4 +54,4 @@ export function summary(found) {
 }
 
 /** What rows of different trees have in common. */
-const key = (r) => (r.label.startsWith('gltfpack') ? `${r.label} ${r.group}` : r.label);
+const key = (r) => (/^(gltfpack|Blender)/.test(r.label) ? `${r.label} ${r.group}` : r.label);

@@ -4,10 +4,11 @@
 //   node tests/bench/others.mjs target/release/pleach TREE.glb... -o DIR [--bakers FILE]
 //
 // Every level is for trees 256 pixels high and judged there, from 16 views (the top included) that no level was fitted
-// to. Equal triangles: gltfpack, Décoret's billboard cloud, crossed quads; equal texture bytes: impostors. What needs a
-// baker of its own is made by `others` (tests/bench/others), beside PLEACH in `examples`. DIR gets all files, and
-// others.md and others.json, written anew after each tree. A run that was broken off goes on where it was: what DIR
-// has with its time (FILE.json) is not made again, so take another DIR for another version of anything.
+// to. Equal triangles: gltfpack, Blender's decimation (where Blender is installed), Décoret's billboard cloud, crossed
+// quads; equal texture bytes: impostors. What needs a baker of its own is made by `others` (tests/bench/others), beside
+// PLEACH in `examples`. DIR gets all files, and others.md and others.json, written anew after each tree. A run that was
+// broken off goes on where it was: what DIR has with its time (FILE.json) is not made again, so take another DIR for
+// another version of anything.
 import { execFileSync, spawnSync } from 'node:child_process';
 import { existsSync, mkdirSync, readFileSync, writeFileSync } from 'node:fs';
 import { basename, dirname, join } from 'node:path';
@@ -38,6 +39,10 @@ if (trees.length === 0 || !options.out) {
   process.exit(2);
 }
 const bakers = options.bakers ?? join(dirname(pleach), 'examples', 'others');
+
+/** Whether there is a Blender to decimate with. */
+const blender = !spawnSync('blender', ['--version']).error;
+const DECIMATE = new URL('others/decimate.py', import.meta.url).pathname;
 
 /** Runs a program; its output and its processor time in seconds (user and system, all threads). */
 function timed(program, words) {
@@ -80,6 +85,14 @@ function made(tree, folder) {
       const timedRun = (program, words) => ({ cpu } = timed(program, words));
       const make = () => ({ ratio: simplified(tree, triangles(file), flags, other, timedRun), cpu });
       rows.push({ group, label, ...once(other, make) });
+    }
+    const decimated = join(folder, `blender_${group}`.replace(/\W+/g, '_') + '.glb');
+    const script = ['--background', '--factory-startup', '--python-exit-code', '1', '--python', DECIMATE, '--'];
+    const make = () => ({ cpu: timed('blender', [...script, tree, decimated, String(triangles(file))]).cpu });
+    try {
+      if (blender) rows.push({ group, label: 'Blender decimate', ...once(decimated, make) });
+    } catch (error) {
+      console.log(`skipped: Blender on ${name} at ${group} (${String(error).trim().split('\n').at(-1)})`);
     }
   }
   for (const [count, quadCount] of QUADS) {
@@ -148,8 +161,7 @@ function nearest(ours, bytes) {
   return ours.filter((r) => off(r) <= least + 0.1).reduce((a, b) => (b.triangles < a.triangles ? b : a));
 }
 
-if (spawnSync('blender', ['--version']).error) console.log("skipped: Blender's decimation (there is no blender here)");
-else console.log("skipped: Blender's decimation (import its file with `pleach evaluate`; this run does not drive it)");
+if (!blender) console.log("skipped: Blender's decimation (there is no blender here; Debian's needs python3-numpy)");
 const found = [];
 for (const tree of trees) {
   const folder = join(options.out, basename(tree, '.glb'));

@@ -6,6 +6,7 @@ use super::embed::data_uri;
 use super::plot::{Plot, Series, mark};
 use super::tables::{bytes, count, table};
 use crate::detail::optimal_cut::Candidate;
+use crate::report::cuts::Cuts;
 use crate::report::schema::Bake;
 
 /// A picture of what was recognised.
@@ -17,35 +18,26 @@ pub struct Recognised {
     pub png: Vec<u8>,
 }
 
-/// What a bake tells beside its figures.
-#[derive(Clone, Debug, Default)]
-pub struct Making {
-    /// Every cut that a budget may have, finest first.
-    pub candidates: Vec<Candidate>,
-    /// The levels that were baked, nearest first.
-    pub chosen: Vec<Candidate>,
-    /// Pictures of what was recognised.
-    pub recognised: Vec<Recognised>,
-}
-
-/// A bake for the page.
+/// What is behind the figures of a page.
 #[derive(Clone, Copy)]
 pub struct Made<'a> {
-    /// Cuts and pictures.
-    pub making: &'a Making,
-    /// Time and memory.
+    /// "How they were made".
+    pub title: &'a str,
+    /// Pictures of what was recognised in the original.
+    pub recognised: &'a [Recognised],
+    /// Time and memory of the command.
     pub took: &'a Bake,
-    /// The package's files and their bytes.
+    /// The files and their bytes.
     pub files: &'a [(String, u64)],
 }
 
-/// Sections on how the levels were made.
-pub fn sections(made: Made) -> Markup {
+/// Sections on how the levels were made; `cuts` where they are known.
+pub fn sections(made: Made, cuts: Option<&Cuts>) -> Markup {
     html! {
         section id="making" aria-labelledby="making-title" {
-            h2 id="making-title" { "How they were made" }
-            (cuts(made.making))
-            @for picture in &made.making.recognised {
+            h2 id="making-title" { (made.title) }
+            @if let Some(cuts) = cuts { (diagram(cuts)) }
+            @for picture in made.recognised {
                 figure {
                     img class="wide" src=(data_uri(&picture.png)) alt={ "What was recognised: " (picture.name) ", from the front and from the right" };
                     figcaption { "Recognised: " (picture.name) "." }
@@ -57,7 +49,7 @@ pub fn sections(made: Made) -> Markup {
     }
 }
 
-fn cuts(making: &Making) -> Markup {
+fn diagram(cuts: &Cuts) -> Markup {
     let series = |name: &str, of: &[Candidate]| Series {
         name: name.into(),
         points: of
@@ -69,8 +61,8 @@ fn cuts(making: &Making) -> Markup {
             .collect(),
     };
     let all = [
-        series("best cut", &making.candidates),
-        series("level", &making.chosen),
+        series("best cut", &cuts.best),
+        series("level", &cuts.levels),
     ];
     let plot = Plot {
         description: "Error in metres against the number of triangles: the best cut for every budget, and the levels that were baked",

@@ -13,7 +13,7 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 use rayon::prelude::*;
 
 use self::embed::data_uri;
-pub use self::making::{Made, Making, Recognised};
+pub use self::making::{Made, Recognised};
 use self::picture::{AGREEMENT, Pair, flip_color, page as atlas_page, pair};
 use self::plot::{Plot, Series, mark};
 use super::schema::{Level, Report};
@@ -36,7 +36,7 @@ pub struct Content<'a> {
     pub views: &'a [View],
     /// Through what.
     pub lens: Lens,
-    /// How the levels were made, where a bake tells.
+    /// What is behind the figures.
     pub made: Option<Made<'a>>,
 }
 
@@ -101,8 +101,8 @@ impl Content<'_> {
                             ul {
                                 li { a href="#levels" { "Figures" } }
                                 li { a href="#diagrams" { "Diagrams" } }
-                                @if self.made.is_some() {
-                                    li { a href="#making" { "How they were made" } }
+                                @if let Some(made) = self.made {
+                                    li { a href="#making" { (made.title) } }
                                 }
                                 @for level in &self.report.levels {
                                     li { a href={ "#level-" (level.level) } { "Level " (level.level) } }
@@ -116,7 +116,7 @@ impl Content<'_> {
                             (tables::changes(self.report))
                         }
                         (self.diagrams())
-                        @if let Some(made) = self.made { (making::sections(made)) }
+                        @if let Some(made) = self.made { (making::sections(made, self.report.cuts.as_ref())) }
                         @for section in &sections { (section) }
                         p class="quiet" {
                             "Made by pleach " (env!("CARGO_PKG_VERSION"))
