@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use super::out::print;
+use super::progress::{Bars, catch_ctrl_c};
 use crate::botany::Model;
 use crate::botany::load::load;
 use crate::botany::recognise::{RecogniseOptions, recognise};
@@ -11,11 +12,11 @@ use crate::error::{Error, Result};
 use crate::pipeline::recognised;
 use crate::report::schema::{Bake, Figure, Level, Report, SizeFigures};
 use crate::report::{
-    Content, Cuts, Made, Recognised, Settings, Start, contact_sheet, evaluate, start,
+    Content, Cuts, Made, Recognised, Settings, Start, contact_sheet, evaluate_watched, start,
 };
 use crate::space::raster::Sampling;
 use crate::space::view::{Lens, View};
-use crate::watch::{Clock, Unwatched, begin};
+use crate::watch::{Clock, begin, step};
 
 /// Measures levels of detail against their original; takes any glTF, also another tool's.
 #[derive(clap::Args, Debug)]
@@ -73,7 +74,8 @@ fn parse_elevation(text: &str) -> std::result::Result<f32, String> {
 /// Runs the command.
 pub fn run(args: &Args) -> Result<()> {
     let started = Instant::now();
-    let clock = Clock::new(Unwatched);
+    catch_ctrl_c()?;
+    let clock = Clock::new(Bars::default());
     begin(&clock, "load", 1)?;
     let original = load(&args.original)?;
     let (files, mut own_heights_px) = split(&args.levels);
@@ -102,8 +104,13 @@ pub fn run(args: &Args) -> Result<()> {
         .zip(&names)
         .map(|(m, n)| (m, n.as_str()))
         .collect();
-    begin(&clock, "measure", 1)?;
-    let measured = evaluate((&original, &file_name(&args.original)), &named, &settings);
+    begin(&clock, "measure", settings.view_set().len() as u64)?;
+    let measured = evaluate_watched(
+        (&original, &file_name(&args.original)),
+        &named,
+        &settings,
+        &|| step(&clock),
+    )?;
     let sizes = levels.iter().map(|model| model.triangles.len() as u64);
     let baked: Vec<(&Path, u64)> = files.iter().map(PathBuf::as_path).zip(sizes).collect();
     let report = Report {
@@ -131,6 +138,7 @@ pub fn run(args: &Args) -> Result<()> {
         };
         write(folder, &report, (&original, &levels), &settings, made)?;
     }
+    clock.inner().finish();
     if args.json {
         print(&(to_json(&report)? + "\n"))
     } else {

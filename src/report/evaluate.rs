@@ -1,5 +1,7 @@
 //! All figures of a set of levels against their original.
 
+use std::convert::Infallible;
+
 use rayon::prelude::*;
 
 use super::cost::{draw_calls, texture_bytes};
@@ -80,6 +82,20 @@ pub fn evaluate(
     levels: &[(&Model, &str)],
     settings: &Settings,
 ) -> Report {
+    let Ok(report) = evaluate_watched::<Infallible>(original, levels, settings, &|| Ok(()));
+    report
+}
+
+/// As [`evaluate`]; `seen` is called after each view of [`Settings::view_set`], by any thread.
+///
+/// # Errors
+/// Those of `seen`.
+pub fn evaluate_watched<E: Send>(
+    original: (&Model, &str),
+    levels: &[(&Model, &str)],
+    settings: &Settings,
+    seen: &(dyn Fn() -> Result<(), E> + Sync),
+) -> Result<Report, E> {
     let views = settings.view_set();
     let mut rows = rows(original, levels, settings);
     let models: Vec<&Model> = levels.iter().map(|(model, _)| *model).collect();
@@ -106,20 +122,20 @@ pub fn evaluate(
         client: settings.client,
         base_colors: settings.client,
     };
-    let found = measure(&asked, &actors(&asked), &all);
+    let found = measure(&asked, &actors(&asked), &all, seen)?;
     for (row, found) in rows.iter_mut().zip(found) {
         row.sizes = found.sizes;
         row.jump_to_next = found.jump;
         row.orbit = found.orbit;
     }
     let levels = rows.split_off(1);
-    Report {
+    Ok(Report {
         position_step_m: original.0.position_step,
         focal_px: settings.lens.focal_px(),
         original: rows.pop(),
         levels,
         ..Report::default()
-    }
+    })
 }
 
 /// What the original and its levels cost, and from where they are shown.

@@ -1,5 +1,7 @@
 //! Measures the levels of a package, each at the sizes that it is for.
 
+use std::convert::Infallible;
+
 use super::evaluate::{Settings, rows};
 use super::measure::{Asked, actors, measure};
 use super::schema::Report;
@@ -60,7 +62,8 @@ pub fn judge(
     };
     let actors = actors(&asked);
     for &height_px in &all {
-        for (row, found) in rows.iter_mut().zip(measure(&asked, &actors, &[height_px])) {
+        let Ok(found) = measure::<Infallible>(&asked, &actors, &[height_px], &|| Ok(()));
+        for (row, found) in rows.iter_mut().zip(found) {
             row.sizes.extend(found.sizes);
         }
         step()?;

@@ -47,23 +47,31 @@ pub struct Found {
     pub orbit: Option<Orbit>,
 }
 
-/// Measures the original and all levels, in that order, at all `heights_px`.
-pub fn measure(asked: &Asked, actors: &[Actor], heights_px: &[u32]) -> Vec<Found> {
-    let mut views: Vec<Vec<OfView>> = asked
-        .views
-        .par_iter()
-        .map(|view| Stand::new(asked, actors, view).measure(heights_px))
-        .collect();
+/// Measures the original and all levels, in that order, at all `heights_px`; `seen` is called after
+/// each view, by any thread.
+///
+/// # Errors
+/// Those of `seen`.
+pub fn measure<E: Send>(
+    asked: &Asked,
+    actors: &[Actor],
+    heights_px: &[u32],
+    seen: &(dyn Fn() -> Result<(), E> + Sync),
+) -> Result<Vec<Found>, E> {
+    let from = |view| {
+        let found = Stand::new(asked, actors, view).measure(heights_px);
+        seen().map(|()| found)
+    };
+    let mut views: Vec<Vec<OfView>> = asked.views.par_iter().map(from).collect::<Result<_, E>>()?;
     let moved: Vec<(u32, f64)> = heights_px
         .iter()
         .map(|&px| (px, moved(&views, px)))
         .collect();
-    (0..actors.len())
-        .map(|actor| {
-            let of_actor = views.iter_mut().map(|v| std::mem::take(&mut v[actor]));
-            found(asked, actor, of_actor.collect(), &moved)
-        })
-        .collect()
+    let all = (0..actors.len()).map(|actor| {
+        let of_actor = views.iter_mut().map(|v| std::mem::take(&mut v[actor]));
+        found(asked, actor, of_actor.collect(), &moved)
+    });
+    Ok(all.collect())
 }
 
 /// Everything that drawing needs of the models of a measurement.

@@ -26,7 +26,7 @@ pub use contact::contact_sheet;
 pub use cost::{draw_calls, texture_bytes};
 pub use cuts::Cuts;
 pub use drawable::Drawable;
-pub use evaluate::{Settings, evaluate};
+pub use evaluate::{Settings, evaluate, evaluate_watched};
 pub use judge::{Judged, heights, judge};
 pub use page::{Content, Made, Recognised};
 pub use reference::Reference;

@@ -164,3 +164,24 @@ fn the_command_refuses_what_it_cannot_read_or_measure() {
         assert!(!done.stderr.is_empty());
     }
 }
+
+#[test]
+fn ctrl_c_ends_a_long_evaluation_and_nothing_is_written() {
+    let oak = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/oak.glb");
+    let home = tempfile::tempdir().unwrap();
+    let out = home.path().join("out");
+    let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_pleach"))
+        .args(["evaluate", oak, oak, "--views", "1000", "-o"])
+        .arg(&out)
+        .stderr(std::process::Stdio::null())
+        .stdout(std::process::Stdio::null())
+        .spawn()
+        .unwrap();
+    // Loading takes a fraction of that, a thousand views many minutes.
+    std::thread::sleep(std::time::Duration::from_secs(2));
+    let stop = format!("kill -INT {}", child.id());
+    let mut shell = std::process::Command::new("sh");
+    assert!(shell.args(["-c", &stop]).status().unwrap().success());
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    assert!(!out.exists());
+}
