@@ -92,7 +92,8 @@ function made(tree, folder) {
     try {
       if (blender) rows.push({ group, label: 'Blender decimate', ...once(decimated, make) });
     } catch (error) {
-      console.log(`skipped: Blender on ${name} at ${group} (${String(error).trim().split('\n').at(-1)})`);
+      const why = String(error).split('\n').filter((line) => /error|extension/i.test(line));
+      console.log(`skipped: Blender on ${name} at ${group} (${why.at(-1)?.trim()})`);
     }
   }
   for (const [count, quadCount] of QUADS) {
