@@ -16,6 +16,19 @@ fn bake(home: &Path, output: &str, more: &[&str]) -> Output {
         .unwrap()
 }
 
+/// A folder with a small palm and a scene for it.
+fn palm() -> tempfile::TempDir {
+    let home = tempfile::tempdir().unwrap();
+    let options = Options {
+        leaves: Some(200),
+        ..Options::default()
+    };
+    let grown = grow(&Species::named("palm").unwrap(), &options).unwrap();
+    std::fs::write(home.path().join("tree.glb"), grown.glb).unwrap();
+    std::fs::write(home.path().join("small.ron"), "(first_height_px: 64)").unwrap();
+    home
+}
+
 fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let entries = std::fs::read_dir(folder).unwrap().map(|e| e.unwrap());
     entries
@@ -30,14 +43,7 @@ fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
 
 #[test]
 fn the_page_shows_cuts_skeleton_time_and_bytes_and_leaves_the_package_as_it_is() {
-    let home = tempfile::tempdir().unwrap();
-    let options = Options {
-        leaves: Some(200),
-        ..Options::default()
-    };
-    let grown = grow(&Species::named("palm").unwrap(), &options).unwrap();
-    std::fs::write(home.path().join("tree.glb"), grown.glb).unwrap();
-    std::fs::write(home.path().join("small.ron"), "(first_height_px: 64)").unwrap();
+    let home = palm();
     let plain = bake(home.path(), "plain", &[]);
     assert!(plain.status.success());
     let done = bake(home.path(), "shown", &["--page"]);
@@ -74,14 +80,7 @@ fn the_page_shows_cuts_skeleton_time_and_bytes_and_leaves_the_package_as_it_is()
 
 #[test]
 fn evaluating_a_package_shows_the_cuts_it_was_chosen_from_and_another_tools_level_has_none() {
-    let home = tempfile::tempdir().unwrap();
-    let options = Options {
-        leaves: Some(200),
-        ..Options::default()
-    };
-    let grown = grow(&Species::named("palm").unwrap(), &options).unwrap();
-    std::fs::write(home.path().join("tree.glb"), grown.glb).unwrap();
-    std::fs::write(home.path().join("small.ron"), "(first_height_px: 64)").unwrap();
+    let home = palm();
     assert!(bake(home.path(), "out", &[]).status.success());
     let evaluate = |level: &str, folder: &str| {
         let done = Command::new(env!("CARGO_BIN_EXE_pleach"))

@@ -3,19 +3,15 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use super::evaluate_folder::Evaluated;
 use super::out::print;
 use super::progress::{Bars, catch_ctrl_c};
 use crate::botany::Model;
 use crate::botany::load::load;
-use crate::botany::recognise::{RecogniseOptions, recognise};
 use crate::error::{Error, Result};
-use crate::pipeline::recognised;
-use crate::report::schema::{Bake, Figure, Level, Report, SizeFigures};
-use crate::report::{
-    Content, Cuts, Made, Recognised, Settings, Start, contact_sheet, evaluate_watched, start,
-};
-use crate::space::raster::Sampling;
-use crate::space::view::{Lens, View};
+use crate::report::schema::{Figure, Level, Report, SizeFigures};
+use crate::report::{Cuts, Settings, Start, evaluate_watched, start};
+use crate::space::view::Lens;
 use crate::watch::{Clock, begin, step};
 
 /// Measures levels of detail against their original; takes any glTF, also another tool's.
@@ -118,40 +114,21 @@ pub fn run(args: &Args) -> Result<()> {
         ..measured
     };
     if let Some(folder) = &args.output {
-        begin(&clock, "recognise", 1)?;
-        let recognised = recognised_in(&args.original)?;
-        let stages = clock.finish();
-        let took = Bake {
-            seconds: started.elapsed().as_secs_f64(),
-            peak_bytes: stages.iter().map(|s| s.peak_bytes).max().filter(|&b| b > 0),
-            stages,
+        let models: Vec<&Model> = levels.iter().collect();
+        let evaluated = Evaluated {
+            report: &report,
+            files: (&args.original, &files),
+            models: (&original, &models),
+            settings: &settings,
+            started,
         };
-        let sizes = [&args.original].into_iter().chain(&files).map(|file| {
-            let about = std::fs::metadata(file).map_err(|e| Error::io(file, "read", e))?;
-            Ok((file_name(file), about.len()))
-        });
-        let made = Made {
-            title: "Behind the figures",
-            recognised: &recognised,
-            took: &took,
-            files: &sizes.collect::<Result<Vec<_>>>()?,
-        };
-        write(folder, &report, (&original, &levels), &settings, made)?;
+        evaluated.write(folder, &clock)?;
     }
     clock.inner().finish();
     if args.json {
         print(&(to_json(&report)? + "\n"))
     } else {
         print(&table(&report))
-    }
-}
-
-/// Pictures of what a bake would see in the original; none where that is no tree.
-fn recognised_in(original: &Path) -> Result<Vec<Recognised>> {
-    match recognise(load(original)?, &RecogniseOptions::default()) {
-        Ok(tree) => recognised(&tree),
-        Err(Error::Input { .. }) => Ok(Vec::new()),
-        Err(error) => Err(error),
     }
 }
 
@@ -174,82 +151,18 @@ fn split(levels: &[String]) -> (Vec<PathBuf>, Vec<Option<u32>>) {
     (files, heights)
 }
 
-fn file_name(file: &Path) -> String {
+pub(super) fn file_name(file: &Path) -> String {
     file.file_name()
         .unwrap_or(file.as_os_str())
         .to_string_lossy()
         .into_owned()
 }
 
-fn to_json(report: &Report) -> Result<String> {
+pub(super) fn to_json(report: &Report) -> Result<String> {
     serde_json::to_string_pretty(report).map_err(|error| Error::Internal {
         step: "report",
         what: error.to_string(),
     })
-}
-
-fn write(
-    folder: &Path,
-    report: &Report,
-    (original, levels): (&Model, &[Model]),
-    settings: &Settings,
-    made: Made,
-) -> Result<()> {
-    std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, "create", e))?;
-    let file = folder.join("report.json");
-    std::fs::write(&file, to_json(report)? + "\n").map_err(|e| Error::io(&file, "write", e))?;
-    let height_px = settings.heights_px.first().copied().unwrap_or(256);
-    let shown = views_to_show(report, settings);
-    let models: Vec<&Model> = levels.iter().collect();
-    let page = Content {
-        report,
-        original,
-        levels: &models,
-        views: &settings.view_set(),
-        lens: settings.lens,
-        made: Some(made),
-    };
-    let file = folder.join("report.html");
-    std::fs::write(&file, page.html()?).map_err(|e| Error::io(&file, "write", e))?;
-    for (name, sampling) in [
-        ("contact.png", Some(Sampling::REFERENCE)),
-        (
-            "contact-client.png",
-            settings.client.then_some(Sampling::CLIENT),
-        ),
-    ] {
-        let Some(sampling) = sampling else { continue };
-        let (width, height, rgba) = contact_sheet(
-            original,
-            &models,
-            &shown,
-            (settings.lens, height_px),
-            sampling,
-        );
-        let file = folder.join(name);
-        image::save_buffer(&file, &rgba, width, height, image::ColorType::Rgba8)
-            .map_err(|e| Error::io(&file, "write", std::io::Error::other(e)))?;
-    }
-    Ok(())
-}
-
-/// The first view, one from above, the last level's worst one, and the top.
-fn views_to_show(report: &Report, settings: &Settings) -> Vec<View> {
-    let worst = report
-        .levels
-        .last()
-        .and_then(|level| level.sizes.first())
-        .map(|size| size.f1.worst_view.as_str());
-    let all = settings.view_set();
-    let above = all.iter().position(|v| v.elevation_deg == 30.0);
-    let keep = |(i, view): &(usize, View)| {
-        *i == 0 || Some(*i) == above || Some(view.name.as_str()) == worst || view.name == "top"
-    };
-    all.into_iter()
-        .enumerate()
-        .filter(keep)
-        .map(|(_, view)| view)
-        .collect()
 }
 
 /// The report for people: one line a level and size.

@@ -3,6 +3,7 @@
 mod bake;
 mod batch;
 mod evaluate;
+mod evaluate_folder;
 mod grow;
 mod inspect;
 mod out;

@@ -7,6 +7,8 @@ mod sided;
 
 use glam::Vec3;
 
+use rayon::prelude::*;
+
 use crate::botany::model::Image;
 use crate::botany::tree::Tree;
 use crate::cloud::{Occlusion, Outline};
@@ -290,19 +292,16 @@ impl Baker<'_> {
         let choices = self.choices();
         let pruning = self.pruning(&choices);
         // Multipliers by factors of two: two cuts of which one costs a few percent more look alike.
-        let mut out: Vec<Candidate> = Vec::new();
-        for exponent in -120..40 {
+        let exponents: Vec<i32> = (-120..40).collect();
+        let cut = |&exponent: &i32| {
             let cut = pruning.at(f64::from(exponent).exp2());
-            if out
-                .last()
-                .is_none_or(|last| last.triangles != cut.triangles)
-            {
-                out.push(Candidate {
-                    triangles: cut.triangles,
-                    error_m: (cut.error / self.area().max(1e-30)).sqrt() * unit_m,
-                });
+            Candidate {
+                triangles: cut.triangles,
+                error_m: (cut.error / self.area().max(1e-30)).sqrt() * unit_m,
             }
-        }
+        };
+        let mut out: Vec<Candidate> = exponents.par_iter().map(cut).collect();
+        out.dedup_by_key(|cut| cut.triangles);
         out
     }
 

@@ -1,8 +1,8 @@
 //! Which samples a scene hits: alpha without colour or depth, the fast path.
 
-use super::pane::{Pane, Panes};
+use super::pane::Pane;
 use super::row::is_all;
-use super::seen::{Seen, seen};
+use super::seen::{Seen, hitting};
 use super::tiles::Tiles;
 use super::triangle::{CENTER, Plane};
 use super::{Camera, Mips, Sampling, Scene};
@@ -78,28 +78,11 @@ impl Mask {
         let sampling = Sampling { side, mips };
         let corners = camera.project(scene.geometry.positions, side);
         let size = [self.width * side, self.height * side].map(|s| s as i32);
-        let mut fragments = 0;
-        let mut tiles = Tiles::default();
-        let mut hits = Vec::new();
-        for (pane, ids) in Panes::new::<u8, 1>(scene, &corners, size, side as i32, CENTER).each() {
-            hits.clear();
-            let rows = pane.y[0]..pane.y[1];
-            let of_picture = |y: i32| {
-                let first = y as usize * size[0] as usize;
-                first + pane.x[0] as usize..first + pane.x[1] as usize
-            };
-            rows.clone()
-                .for_each(|y| hits.extend_from_slice(&self.samples[of_picture(y)]));
-            tiles.clear(&pane);
-            let all = ids.iter().filter_map(|&id| seen(scene, &corners, id));
-            all.for_each(|shown| {
-                fragments += hit::<COUNTED>(&shown, scene, sampling, &pane, &mut tiles, &mut hits);
-            });
-            for (y, row) in rows.zip(hits.chunks_exact(pane.width())) {
-                self.samples[of_picture(y)].copy_from_slice(row);
-            }
-        }
-        fragments
+        let (whole, hits) = (Pane::of(size), &mut self.samples);
+        let mut tiles = Tiles::new(&whole);
+        let all = hitting(scene, &corners, CENTER);
+        all.map(|shown| hit::<COUNTED>(&shown, scene, sampling, &whole, &mut tiles, hits))
+            .sum()
     }
 
     /// Averages the samples of every pixel.
@@ -175,13 +158,13 @@ impl Coverage {
     }
 }
 
-/// Sets the samples of a pane that a triangle hits; returns those inside it, if they are counted.
+/// Sets the samples that a triangle hits; returns those inside it, if they are counted.
 #[inline]
 fn hit<const COUNTED: bool>(
     shown: &Seen,
     scene: &Scene,
     sampling: Sampling,
-    pane: &Pane,
+    whole: &Pane,
     tiles: &mut Tiles,
     hits: &mut [u8],
 ) -> u64 {
@@ -194,8 +177,7 @@ fn hit<const COUNTED: bool>(
     let mut fragment = None;
     let mut draw = |part: &Pane, hits: &mut [u8]| {
         shown.triangle.rows(part, CENTER, |y, row| {
-            let first = pane.row(y);
-            let column = |x: i32| first + (x - pane.x[0]) as usize;
+            let column = |x: i32| whole.row(y) + x as usize;
             let [from, to] = row.reach().map(column);
             // Inside a crown most samples are hit: edges are not even looked at.
             if !COUNTED && is_all::<1>(&hits[from..to]) {
@@ -215,11 +197,11 @@ fn hit<const COUNTED: bool>(
         });
     };
     if COUNTED {
-        draw(pane, hits);
+        draw(whole, hits);
     } else {
         // What lies in full tiles alone is not even scanned.
         let flat = (0.0, Plane::default);
-        tiles.visible(&shown.triangle, pane, flat, hits, least, draw);
+        tiles.visible(&shown.triangle, whole, flat, hits, least, draw);
     }
     fragments
 }

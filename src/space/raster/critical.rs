@@ -8,9 +8,9 @@
 //! Who knows about where the threshold is asks for a range: pixels above it are as good as opaque,
 //! texels below it as good as holes, and most fragments are passed over.
 
-use super::pane::Panes;
+use super::pane::Pane;
 use super::row::TexelRow;
-use super::seen::seen;
+use super::seen::hitting;
 use super::texture::{BLOCK, Level};
 use super::triangle::CENTER;
 use super::{Camera, Mask, Mips, Sampling, Scene};
@@ -65,30 +65,29 @@ pub fn critical(scene: &Scene, camera: &Camera, covered: &Mask, scores: Scores) 
     };
     let mut pixels: Vec<f32> = covered.samples.iter().map(of_mask).collect();
     pixels.resize(width as usize * height as usize, f32::NEG_INFINITY);
-    for (pane, ids) in Panes::new::<f32, 1>(scene, &corners, [width, height], 1, CENTER).each() {
-        for shown in ids.iter().filter_map(|&id| seen(scene, &corners, id)) {
-            let mut fragment = None;
-            shown.triangle.rows(&pane, CENTER, |y, row| {
-                let first = y as usize * width as usize;
-                let [from, to] = row.reach().map(|x| first + x as usize);
-                // Inside a crown most pixels are settled: edges are not even looked at.
-                if pixels[from..to].iter().all(|&p| p >= ceiling) {
-                    return;
-                }
-                let [(from, to)] = row.spans();
-                if from >= to {
-                    return;
-                }
-                let row = &mut pixels[first + from as usize..first + to as usize];
-                if shown.material.cutoff.is_none() {
-                    return row.fill(f32::INFINITY);
-                }
-                let fragment = fragment.get_or_insert_with(|| shown.fragment(scene, SAMPLING));
-                if let Some(texels) = fragment.base_row(y) {
-                    scores.raise(&texels, from, row);
-                }
-            });
-        }
+    let whole = Pane::of([width, height]);
+    for shown in hitting(scene, &corners, CENTER) {
+        let mut fragment = None;
+        shown.triangle.rows(&whole, CENTER, |y, row| {
+            let first = y as usize * width as usize;
+            let [from, to] = row.reach().map(|x| first + x as usize);
+            // Inside a crown most pixels are settled: edges are not even looked at.
+            if pixels[from..to].iter().all(|&p| p >= ceiling) {
+                return;
+            }
+            let [(from, to)] = row.spans();
+            if from >= to {
+                return;
+            }
+            let row = &mut pixels[first + from as usize..first + to as usize];
+            if shown.material.cutoff.is_none() {
+                return row.fill(f32::INFINITY);
+            }
+            let fragment = fragment.get_or_insert_with(|| shown.fragment(scene, SAMPLING));
+            if let Some(texels) = fragment.base_row(y) {
+                scores.raise(&texels, from, row);
+            }
+        });
     }
     let above = pixels.iter().filter(|&&p| p >= ceiling).count();
     pixels.retain(|&p| p > floor && p < ceiling);

@@ -4,7 +4,6 @@ use super::camera::Corner;
 use super::pane::{Pane, Panes};
 use super::seen::{Seen, seen};
 use super::tiles::Tiles;
-use super::triangle::CENTER;
 use super::{Camera, Sampling, Scene};
 
 /// The triangle of a sample that nothing hits.
@@ -40,7 +39,7 @@ pub fn draw(scene: &Scene, camera: &Camera, sampling: Sampling) -> Items {
         near: vec![f32::NEG_INFINITY; count],
     };
     let mut front = Front::default();
-    for (pane, ids) in Panes::new::<(f32, u32), 1>(scene, &corners, size, side, CENTER).each() {
+    for (pane, ids) in Panes::new(scene, &corners, size, side).each() {
         front.draw(scene, &corners, sampling, &pane, ids);
         for y in pane.y[0]..pane.y[1] {
             let from = pane.row(y)..pane.row(y) + pane.width();

@@ -7,7 +7,6 @@ use super::pane::Panes;
 use super::relief::Relief;
 use super::shade::Light;
 use super::shader::{Shaded, Shader};
-use super::triangle::CENTER;
 use super::{Camera, Mask, Sampling, Scene};
 
 /// Pixels of a drawing, rows from the top. Everything is a mean over *all* samples of the pixel,
@@ -45,7 +44,7 @@ pub fn layers(
     let mut samples = vec![0u32; layers.color.len()];
     let mut shader = Shader::new(scene, &corners, sampling, light, reliefs);
     let mut front = Front::default();
-    for (pane, ids) in Panes::new::<(f32, u32), 1>(scene, &corners, size, side, CENTER).each() {
+    for (pane, ids) in Panes::new(scene, &corners, size, side).each() {
         front.draw(scene, &corners, sampling, &pane, ids);
         for (y, items) in (pane.y[0]..).zip(front.items.chunks_exact(pane.width())) {
             let at = y as usize * size[0] as usize + pane.x[0] as usize;

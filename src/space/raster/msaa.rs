@@ -6,9 +6,9 @@
 
 use super::camera::SUBSAMPLES;
 use super::coverage::Coverage;
-use super::pane::Panes;
+use super::pane::Pane;
 use super::row::is_all;
-use super::seen::seen;
+use super::seen::hitting;
 use super::{Camera, Mips, Sampling, Scene};
 
 /// The standard places of four samples, in 16ths of a pixel from its corner (Vulkan 1.3, 26.4
@@ -57,14 +57,10 @@ impl Multisampled {
         let (width, height) = (self.width as i32, self.height as i32);
         let hits = &mut self.hits;
         let places = PLACES.map(|(x, y)| [x, y].map(|p| p * SUBSAMPLES / 16));
-        let panes = Panes::new::<u8, 4>(scene, &corners, [width, height], 1, places);
-        let all = panes.each().flat_map(|(pane, ids)| {
-            let seen = |&id| seen(scene, &corners, id);
-            ids.iter().filter_map(seen).map(move |shown| (pane, shown))
-        });
-        for (pane, shown) in all {
+        let whole = Pane::of([width, height]);
+        for shown in hitting(scene, &corners, places) {
             let mut fragment = None;
-            shown.triangle.rows(&pane, places, |y, row| {
+            shown.triangle.rows(&whole, places, |y, row| {
                 let first = (y * width) as usize;
                 let [from, to] = row.reach().map(|x| first + x as usize);
                 // Inside a crown most pixels are full: edges are not even looked at.

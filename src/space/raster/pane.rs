@@ -6,10 +6,10 @@
 
 use super::Scene;
 use super::camera::Corner;
-use super::triangle::{may_hit, reach};
+use super::triangle::{CENTER, reach};
 
-/// Bytes that the samples of a pane take at most.
-const BYTES: usize = 1 << 18;
+/// Edge of a pane in samples: depths and items of one take 288 kilobytes.
+const EDGE: i32 = 192;
 
 /// A rectangle of samples (or of pixels with several places).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,8 +37,7 @@ impl Pane {
         (self.y[1] - self.y[0]) as usize
     }
 
-    /// Where a sample's row starts in a buffer that holds this pane alone, less the first column:
-    /// add the column.
+    /// Where a row starts in a buffer that holds this pane alone.
     #[inline]
     pub fn row(&self, y: i32) -> usize {
         (y - self.y[0]) as usize * self.width()
@@ -56,32 +55,23 @@ pub(super) struct Panes {
 }
 
 impl Panes {
-    /// Of a picture of so many samples of type `T`, `side` along a pixel's edge: no pane cuts a pixel.
-    /// `corners` are the scene's positions, projected; `places` as in [`Triangle::rows`](super::triangle::Triangle::rows).
-    pub fn new<T, const N: usize>(
-        scene: &Scene,
-        corners: &[Corner],
-        size: [i32; 2],
-        side: i32,
-        places: [[i32; 2]; N],
-    ) -> Self {
-        let edge = (BYTES / size_of::<T>()).isqrt() as i32;
-        let edge = (edge / side).max(1) * side;
+    /// Of a picture of so many samples, `side` along a pixel's edge: no pane cuts a pixel. `corners`
+    /// are the scene's positions, projected.
+    pub fn new(scene: &Scene, corners: &[Corner], size: [i32; 2], side: i32) -> Self {
+        let edge = (EDGE / side).max(1) * side;
         let [across, down] = size.map(|s| (s + edge - 1) / edge);
         let whole = Pane::of(size);
-        if across * down == 1 {
-            return Self::one(scene, corners, size, places);
-        }
         let mut ends = vec![0u32; (across * down) as usize];
         let mut pairs: Vec<[u32; 2]> = Vec::with_capacity(scene.geometry.triangles.len());
-        for (id, indices) in scene.geometry.triangles.iter().enumerate() {
-            let Some(reached) = shown(indices, corners, &whole, places) else {
+        for (id, indices) in (0..).zip(scene.geometry.triangles) {
+            let at = indices.map(|i| corners[i as usize]);
+            let Some(reached) = reach(&at, &whole, CENTER) else {
                 continue;
             };
             let [[x0, x1], [y0, y1]] = reached.map(|ends| ends.map(|s| s / edge));
             for pane in (y0..=y1).flat_map(|y| (x0..=x1).map(move |x| (y * across + x) as u32)) {
                 ends[pane as usize] += 1;
-                pairs.push([pane, id as u32]);
+                pairs.push([pane, id]);
             }
         }
         // From numbers to starts; each start moves to its end while triangles are put there.
@@ -104,27 +94,6 @@ impl Panes {
         }
     }
 
-    /// A picture that is small enough as it is.
-    fn one<const N: usize>(
-        scene: &Scene,
-        corners: &[Corner],
-        size: [i32; 2],
-        places: [[i32; 2]; N],
-    ) -> Self {
-        let whole = Pane::of(size);
-        let hits =
-            |(_, indices): &(u32, &[u32; 3])| shown(indices, corners, &whole, places).is_some();
-        let all = (0..).zip(scene.geometry.triangles).filter(hits);
-        let triangles: Vec<u32> = all.map(|(id, _)| id).collect();
-        Self {
-            size,
-            edge: size[0].max(size[1]),
-            across: 1,
-            ends: vec![triangles.len() as u32],
-            triangles,
-        }
-    }
-
     /// Every pane that anything may hit with its triangles, in the scene's order.
     pub fn each(&self) -> impl Iterator<Item = (Pane, &[u32])> {
         let starts = [0].into_iter().chain(self.ends.iter().copied());
@@ -143,22 +112,9 @@ impl Panes {
     }
 }
 
-/// Where a triangle may hit a picture; most triangles of a far tree do not.
-#[inline]
-fn shown<const N: usize>(
-    indices: &[u32; 3],
-    corners: &[Corner],
-    whole: &Pane,
-    places: [[i32; 2]; N],
-) -> Option<[[i32; 2]; 2]> {
-    let at: [Corner; 3] = indices.map(|i| corners[i as usize]);
-    reach(&at, whole, places).filter(|_| N == 1 || may_hit(&at, places))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::space::raster::triangle::CENTER;
     use crate::space::raster::{Camera, Geometry, Material, Sampling, coverage};
     use glam::Vec3;
 
@@ -185,15 +141,14 @@ mod tests {
             textures: &[],
         };
         let corners = camera.project(scene.geometry.positions, 3);
-        let panes = Panes::new::<[u32; 2], 1>(&scene, &corners, [300, 210], 3, CENTER);
+        let panes = Panes::new(&scene, &corners, [300, 210], 3);
         let found: Vec<(Pane, Vec<u32>)> =
             panes.each().map(|(pane, ids)| (pane, ids.into())).collect();
-        // Of whole pixels: 180 samples along an edge of a pane of 8 bytes a sample.
         let samples: usize = found.iter().map(|(p, _)| p.width() * p.height()).sum();
         assert_eq!((found.len(), samples), (4, 300 * 210));
         let first = Pane {
-            x: [0, 180],
-            y: [0, 180],
+            x: [0, 192],
+            y: [0, 192],
         };
         assert_eq!(found[0], (first, vec![0, 1]));
         assert!(found[1..].iter().all(|(_, ids)| ids == &[1]));

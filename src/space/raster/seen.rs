@@ -2,7 +2,7 @@
 
 use super::camera::Corner;
 use super::fragment::Fragment;
-use super::triangle::Triangle;
+use super::triangle::{Triangle, may_hit};
 use super::{Material, Sampling, Scene};
 
 /// What drawing needs of one triangle.
@@ -25,6 +25,22 @@ pub(super) fn seen<'s>(scene: &'s Scene<'s>, corners: &[Corner], id: u32) -> Opt
         material,
         triangle: Triangle::new(at, material.double_sided)?,
         indices,
+    })
+}
+
+/// The triangles that may hit a sample at one of `places` and are seen, in order.
+pub(super) fn hitting<'s, const N: usize>(
+    scene: &'s Scene<'s>,
+    corners: &'s [Corner],
+    places: [[i32; 2]; N],
+) -> impl Iterator<Item = Seen<'s>> {
+    let all = (0..).zip(scene.geometry.triangles);
+    all.filter_map(move |(id, indices)| {
+        let at = indices.map(|i| corners[i as usize]);
+        match may_hit(&at, places) {
+            true => seen(scene, corners, id),
+            false => None,
+        }
     })
 }
 

@@ -33,6 +33,13 @@ pub(super) struct Tiles {
 }
 
 impl Tiles {
+    /// Of an empty picture.
+    pub fn new(whole: &Pane) -> Self {
+        let mut tiles = Self::default();
+        tiles.clear(whole);
+        tiles
+    }
+
     /// Starts with an empty pane.
     pub fn clear(&mut self, pane: &Pane) {
         (self.width, self.height) = (pane.width(), pane.height());

@@ -170,7 +170,7 @@ impl Triangle {
 }
 
 /// The first and last column, and row, of a pane that may have samples inside; `None` where none
-/// has: most triangles of a far tree lie between all samples, and this is all that they cost.
+/// has.
 pub(super) fn reach<const N: usize>(
     corners: &[Corner; 3],
     pane: &Pane,
@@ -195,7 +195,7 @@ pub(super) fn reach<const N: usize>(
     (x[0] <= x[1] && y[0] <= y[1]).then_some([x, y])
 }
 
-/// Whether any of several places of a pixel may be inside, each asked for itself.
+/// Whether any sample may be inside, each of several places of a pixel asked for itself.
 pub(super) fn may_hit<const N: usize>(corners: &[Corner; 3], places: [[i32; 2]; N]) -> bool {
     let [a, b, c] = corners;
     let (x0, x1) = (a.x.min(b.x).min(c.x), a.x.max(b.x).max(c.x));
