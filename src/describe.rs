@@ -170,6 +170,7 @@ impl<'a> Describer<'a> {
             subtree: self.common_subtree(members),
             corners: chart.corners.iter().map(|&p| world(frame, p)).collect(),
             copy_of: None,
+            copy_in: None,
             atlas: chart.rectangle_in_atlas(),
             back: None,
             shows: group.triangles.len() as u32,

@@ -40,11 +40,15 @@ pub mod ladder;
 #[cfg(feature = "bake")]
 pub mod level;
 #[cfg(feature = "bake")]
+mod levels;
+#[cfg(feature = "bake")]
 mod measured_visibility;
 #[cfg(feature = "bake")]
 pub mod pipeline;
 #[cfg(feature = "bake")]
 pub mod plan;
+#[cfg(feature = "bake")]
+mod prepared;
 #[cfg(feature = "bake")]
 mod provenance;
 #[cfg(feature = "bake")]
@@ -61,6 +65,8 @@ mod sharing;
 #[cfg(feature = "bake")]
 mod solid;
 pub mod space;
+#[cfg(feature = "bake")]
+pub mod species;
 #[cfg(feature = "bake")]
 pub mod study;
 #[cfg(feature = "bake")]

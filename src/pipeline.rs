@@ -1,31 +1,22 @@
 //! The bake: every step in order, one line each. Read this first.
 
 use crate::beside::{alone, hierarchy, instanced, told};
-use crate::botany::load::{load, load_slice, read};
-use crate::botany::model::Model;
+use crate::botany::load::load;
 use crate::botany::portrait;
-use crate::botany::recognise::{RecogniseOptions, recognise};
 use crate::botany::tree::Tree;
-use crate::describe::Describer;
-use crate::detail::element::elements;
-use crate::detail::merge::merge;
 use crate::detail::optimal_cut::Candidate;
-use crate::detail::optimal_distance::TEXELS;
-use crate::detail::wood::Wood;
 use crate::error::{Error, Result};
-use crate::export::combined::{Packed, extras};
-use crate::export::manifest::{self, FORMAT, Manifest, Range, VERSION, Visibility};
-use crate::export::original::Original;
+use crate::export::combined::Packed;
+use crate::export::manifest::{Manifest, Provenance, Range, Visibility};
 use crate::export::package::{Package, remove_beside};
-use crate::export::surface::scene_of_model;
 use crate::knobs::check;
-use crate::ladder::{LEAST_TRIANGLES, Rung, WHOLE_TREE_TRIANGLES, ranges, rungs, seen};
+use crate::ladder::Rung;
 pub use crate::ladder::{Limit, Wanted};
-use crate::level::{Baker, LevelRequest, MASK_HEIGHT};
+use crate::level::LevelRequest;
+use crate::levels::{Levels, needed};
 use crate::measured_visibility::measure_subtrees;
-use crate::provenance::check_name;
+use crate::prepared::{Pieces, Prepared};
 pub use crate::provenance::provenance;
-use crate::recipe::Method;
 use crate::report::schema::Report;
 use crate::report::{Cuts, Judged, Recognised, Settings, heights, judge};
 pub use crate::request::Request;
@@ -65,35 +56,14 @@ pub fn bake(request: &Request, watch: &dyn Watch) -> Result<Baked> {
 fn made(request: &Request, watch: &dyn Watch) -> Result<Baked> {
     check(&request.scene)?;
     request.recipe.packer.check()?;
-    check_name(&request.input)?;
     let package = Package::start(&request.output, request.force)?;
-    begin(watch, "load", 1)?;
-    // Read once, so that what is described is what is baked (files that it refers to are read twice).
-    let limits = &request.recipe.limits;
-    let input = read(&request.input, limits)?;
-    let provenance = provenance(request, &input)?;
-    let model = load_slice(&input, &request.input, limits)?;
-    drop(input);
-    let rungs = rungs(
-        &request.wanted,
-        &request.scene,
-        model.triangles.len() as u64,
-        match request.recipe.method {
-            Method::CrossedQuads => 4,
-            _ => LEAST_TRIANGLES,
-        },
-    )?;
-    let rungs = seen(rungs, &request.scene, height_m(&model));
-    begin(watch, "recognise", 1)?;
-    let organs = request.recipe.organs.clone();
-    let tree = recognise(model, &RecogniseOptions { organs })?;
-    let ranges = ranges(
-        &rungs,
-        &request.scene,
-        height_m(&tree.model),
-        width_to_height(&tree.model),
-    );
-    let Levels {
+    let Prepared {
+        provenance,
+        tree,
+        rungs,
+        ranges,
+    } = Prepared::new(request, watch)?;
+    let Made {
         packed,
         manifest: levels,
         shares,
@@ -103,8 +73,10 @@ fn made(request: &Request, watch: &dyn Watch) -> Result<Baked> {
     let mut files = write(&package, &tree, &packed, watch)?;
     let shares = sheets(&package, &packed[1..], shares, &mut files)?;
     let instancing = match request.recipe.instancing {
-        true => instanced(&package, &tree, &request.recipe, &packed[0], &mut files)?,
-        false => None,
+        true if packed[0].shown => {
+            instanced(&package, &tree, &request.recipe, &packed[0], &mut files)?
+        }
+        _ => None,
     };
     let tiles = match request.recipe.hierarchy {
         true => Some(hierarchy(
@@ -122,7 +94,7 @@ fn made(request: &Request, watch: &dyn Watch) -> Result<Baked> {
     };
     let judged = read_back(&package, &packed[1..], &rungs)?;
     begin(watch, "measure", heights(&judged).len() as u64)?;
-    let measured = (&tree.model, files[0].as_str());
+    let measured = (&tree.model, original_file(&levels, &provenance));
     let report = judge(measured, &judged, &settings(&request.scene), || step(watch))?;
     let sharing = sharing::told(&report, shares);
     let mut warnings = levels.tree.warnings.clone();
@@ -136,7 +108,7 @@ fn made(request: &Request, watch: &dyn Watch) -> Result<Baked> {
         cuts: Some(cuts(candidates, &levels)),
         ..report
     };
-    if request.recipe.instancing {
+    if request.recipe.instancing && packed[0].shown {
         warnings.extend(alone(&tree, &request.recipe, report.instancing.as_ref()));
     }
     let found = in_band(&tree, &rungs, &judged, &report);
@@ -168,7 +140,14 @@ fn made(request: &Request, watch: &dyn Watch) -> Result<Baked> {
     })
 }
 
-fn cuts(best: Vec<Candidate>, made: &Manifest) -> Cuts {
+/// Where the original can be looked at: its file in the package, the input where the scene shows no level 0.
+pub fn original_file<'a>(made: &'a Manifest, from: &'a Provenance) -> &'a str {
+    let level = made.levels.first().map(|level| level.file.as_str());
+    level.filter(|file| !file.is_empty()).unwrap_or(&from.input)
+}
+
+/// The best cuts of a tree, and the levels that were made of some.
+pub fn cuts(best: Vec<Candidate>, made: &Manifest) -> Cuts {
     let levels = made.levels.iter().skip(1).map(|level| Candidate {
         triangles: level.triangles,
         error_m: level.error_m,
@@ -193,7 +172,7 @@ pub fn recognised(tree: &Tree) -> Result<Vec<Recognised>> {
 }
 
 /// All levels, level 0 first, and what is told of them.
-struct Levels {
+struct Made {
     packed: Vec<Packed>,
     manifest: Manifest,
     shares: Vec<Share>,
@@ -207,72 +186,26 @@ fn levels(
     rungs: &[Rung],
     ranges: &[Range],
     watch: &dyn Watch,
-) -> Result<Levels> {
-    begin(watch, "group", 1)?;
-    let elements = elements(tree);
-    let hierarchy = merge(&elements, request.recipe.locality);
-    let wood = Wood::new(tree, true);
-    begin(watch, "look", 1)?;
-    let original = Original::new(&tree.model, request.recipe.training_views, MASK_HEIGHT);
-    let baker = Baker {
-        tree,
-        elements: &elements,
-        hierarchy: &hierarchy,
-        wood: &wood,
-        original: &original,
-        recipe: &request.recipe,
-    };
+) -> Result<Made> {
+    let pieces = Pieces::new(tree, &request.recipe, watch)?;
+    let baker = pieces.baker(&request.recipe);
     begin(watch, "describe", 1)?;
-    let describer = Describer::new(tree, &elements, &request.scene);
-    let mut manifest = Manifest {
-        format: FORMAT.into(),
-        version: VERSION,
-        recipe: request.recipe.clone().as_described(),
-        scene: request.scene.clone(),
-        tree: describer.original(),
-        subtree_texels: TEXELS,
-        subtrees: describer.subtrees(),
-        ..Manifest::default()
-    };
-    let height_m = manifest.tree.height_m;
+    let mut levels = Levels::new(request, tree, &pieces.elements, ranges);
     begin(watch, "bake levels", rungs.len() as u64 + 1)?;
-    let name = |level: usize| format!("{}_LOD{level}", tree.model.name);
-    let all = scene_of_model(&tree.model, 0..tree.model.triangles.len() as u32);
-    manifest.levels.push(manifest::Level {
-        file: name(0) + ".glb",
-        triangles: all.triangles(),
-        range: ranges[0],
-        ..manifest::Level::default()
-    });
-    let mut packed = Vec::with_capacity(rungs.len() + 1);
-    let mut last = Packed {
-        name: name(0),
-        pngs: Vec::new(),
-        scene: all,
-        extras: extras(0, &ranges[0], 0.0, height_m, &request.scene),
-        range: ranges[0],
-    };
     step(watch)?;
     let mut shares = Vec::with_capacity(rungs.len());
     let heights: Vec<u32> = rungs.iter().map(|r| pixels(r.height_px)).collect();
     let ruler = (request.recipe.sharing > 0.0)
         .then(|| sharing::Ruler::new(&tree.model, &heights, &settings(&request.scene)));
-    for (rung, &range) in rungs.iter().zip(&ranges[1..]) {
-        let level = packed.len() + 1;
-        let enough = request.max_error_px.map_or(u64::MAX, |pixels| {
-            baker
-                .triangles_within(pixels, rung.height_px)
-                .max(WHOLE_TREE_TRIANGLES)
-        });
-        let rung = Rung {
-            triangles: rung.triangles.min(enough),
-            ..*rung
-        };
+    for rung in rungs {
+        let level = levels.packed.len();
+        let rung = needed(rung, request.max_error_px, &baker);
         let level_wanted = LevelRequest::of(&rung, request.recipe.method);
         // A level's images are encoded while the next one is made: PNG of one page keeps one core busy.
+        let last = levels.packed.last_mut();
         let (made, encoded) = rayon::join(
             || baker.level(level_wanted, watch),
-            || encode_images_of(&mut last),
+            || last.map_or(Ok(()), encode_images_of),
         );
         let (made, ()) = (made?, encoded?);
         let (made, share) = match &ruler {
@@ -288,32 +221,25 @@ fn levels(
         };
         shares.push(share);
         part(watch, "describe")?;
-        let described = describer.level(level, &(name(level) + ".glb"), &made, range);
-        let next = Packed {
-            name: name(level),
-            pngs: Vec::new(),
-            scene: made.scene,
-            extras: extras(level, &range, described.error_m, height_m, &request.scene),
-            range,
-        };
-        packed.push(std::mem::replace(&mut last, next));
-        manifest.levels.push(described);
+        levels.add(made);
         step(watch)?;
     }
     part(watch, "encode")?;
-    encode_images_of(&mut last)?;
-    packed.push(last);
+    levels.packed.last_mut().map_or(Ok(()), encode_images_of)?;
     let candidates = baker.candidates(tree.model.frame.radius);
-    Ok(Levels {
-        packed,
-        manifest,
+    Ok(Made {
+        packed: levels.packed,
+        manifest: levels.manifest,
         shares,
         candidates,
     })
 }
 
 /// Loads the levels as an engine would: from their files.
-fn read_back(package: &Package, packed: &[Packed], rungs: &[Rung]) -> Result<Vec<Judged>> {
+///
+/// # Errors
+/// Those of reading what was just written.
+pub fn read_back(package: &Package, packed: &[Packed], rungs: &[Rung]) -> Result<Vec<Judged>> {
     let read = |(level, rung): (&Packed, &Rung)| {
         let file = format!("{}.glb", level.name);
         let mut model = load(&package.file(&file))?;
@@ -329,7 +255,7 @@ fn read_back(package: &Package, packed: &[Packed], rungs: &[Rung]) -> Result<Vec
 }
 
 /// Height of a tree at which a level is measured.
-fn pixels(height: f64) -> u32 {
+pub fn pixels(height: f64) -> u32 {
     (height.round() as u32).max(8)
 }
 
@@ -339,7 +265,7 @@ pub fn lens(scene: &Scene) -> Lens {
 }
 
 /// The views of the report.
-fn settings(scene: &Scene) -> Settings {
+pub fn settings(scene: &Scene) -> Settings {
     Settings {
         azimuth_offset_deg: REPORT_OFFSET_DEG,
         lens: lens(scene),
@@ -356,23 +282,4 @@ pub fn to_json(report: &Report) -> Result<String> {
         step: "report",
         what: error.to_string(),
     })
-}
-
-fn height_m(model: &Model) -> f64 {
-    f64::from(model.height()) * model.frame.radius
-}
-
-/// Wider side of the bounding box over its height.
-fn width_to_height(model: &Model) -> f64 {
-    let (mut low, mut high) = (glam::Vec3::MAX, glam::Vec3::MIN);
-    for p in model
-        .triangles
-        .iter()
-        .flatten()
-        .map(|&i| model.positions[i as usize])
-    {
-        (low, high) = (low.min(p), high.max(p));
-    }
-    let size = (high - low).as_dvec3();
-    size.x.max(size.z) / size.y.max(1e-9)
 }

@@ -51,7 +51,10 @@ impl<'a> Ruler<'a> {
     }
 
     /// Writes a level, reads it back and measures it where it starts: F1, and bytes of textures.
-    fn measure(&self, level: &Level, height_px: u32) -> Result<(Figure, u64)> {
+    ///
+    /// # Errors
+    /// Those of writing and reading levels.
+    pub fn measure(&self, level: &Level, height_px: u32) -> Result<(Figure, u64)> {
         let pngs = encode_images(&level.scene)?;
         let frame = &self.original.frame;
         let bytes = write_glb("level", &level.scene, &pngs, frame, Value::Null)?;
@@ -89,7 +92,7 @@ impl<'a> Ruler<'a> {
         let density = level.density;
         for candidate in shared {
             let (f1, _) = self.measure(&candidate, height_px)?;
-            if f1.mean >= without.mean - most && f1.worst >= without.worst - WORST * most {
+            if within(&f1, &without, most) {
                 level = candidate;
                 break;
             }
@@ -106,6 +109,11 @@ impl<'a> Ruler<'a> {
             told,
         })
     }
+}
+
+/// Whether a level that shares texels loses no more than `most` of F1.
+pub fn within(f1: &Figure, without: &Figure, most: f64) -> bool {
+    f1.mean >= without.mean - most && f1.worst >= without.worst - WORST * most
 }
 
 /// A level whose cards share nothing.

@@ -19,6 +19,9 @@ pub type Share = (SharedLevel, Option<Vec<u8>>);
 
 /// Turns a level's images into PNG and drops their pixels: all levels wait for the last one.
 pub fn encode_images_of(level: &mut Packed) -> Result<()> {
+    if !level.shown {
+        return Ok(());
+    }
     level.pngs = encode_images(&level.scene)?;
     for image in &mut level.scene.images {
         image.rgba = Arc::default();
@@ -26,7 +29,7 @@ pub fn encode_images_of(level: &mut Packed) -> Result<()> {
     Ok(())
 }
 
-/// Writes every level alone and all in one; returns the names of the package's files.
+/// Writes every level that is shown alone and all in one; returns the names of the package's files.
 pub fn write(
     package: &Package,
     tree: &Tree,
@@ -35,7 +38,7 @@ pub fn write(
 ) -> Result<Vec<String>> {
     let frame = &tree.model.frame;
     let mut files = Vec::with_capacity(packed.len() + 3);
-    for level in packed {
+    for level in packed.iter().filter(|level| level.shown) {
         let file = format!("{}.glb", level.name);
         let extras: Value = level.extras.clone();
         let bytes = write_glb(&level.name, &level.scene, &level.pngs, frame, extras)?;

@@ -4,8 +4,9 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::Mutex;
 
+use pleach::botany::load::load;
 use pleach::export::manifest::Manifest;
-use pleach::pipeline::{Request, bake};
+use pleach::pipeline::{Request, Wanted, bake};
 use pleach::recipe::Recipe;
 use pleach::scene::Scene;
 use pleach::watch::Watch;
@@ -188,10 +189,54 @@ fn a_scene_that_comes_no_nearer_does_no_work_for_near_levels() {
     let baked = bake(&request, &work).unwrap();
     assert_eq!(baked.report.levels.len(), 1);
     assert_eq!(baked.report.levels[0].triangles, 24);
-    // Level 0 is written as it is; one level is cut, projected and measured.
+    // One level is cut, projected and measured; level 0, which would have been seen until 184 m, is not written.
     assert_eq!(work.of("bake levels"), 2);
     assert_eq!(work.of("project"), 1);
     assert_eq!(work.of("measure"), 1);
+    let read = |file: &str| std::fs::read(request.output.join(file));
+    assert!(read("oak_LOD0.glb").is_err());
+    let text = String::from_utf8(read("oak.pleach.ron").unwrap()).unwrap();
+    let manifest = Manifest::from_ron(&text, Path::new("oak.pleach.ron")).unwrap();
+    assert_eq!(
+        (manifest.levels.len(), manifest.levels[0].file.as_str()),
+        (2, "")
+    );
+    assert!(manifest.files.iter().all(|f| read(f).is_ok()));
+    assert_eq!(manifest.files.len(), 4);
+    // All levels in one: level 1 alone, and less than the original's positions take.
+    let all = load(&request.output.join("oak.glb")).unwrap();
+    assert_eq!(all.triangles.len(), 24);
+    assert!(read("oak.glb").unwrap().len() < 400_000);
+    assert_eq!(baked.report.original.unwrap().file, "oak.glb");
+}
+
+#[test]
+fn a_scene_that_sees_level_1_fade_in_has_level_0() {
+    let home = tempfile::tempdir().unwrap();
+    let files = |nearest_m: f64| {
+        let request = Request {
+            input: oak(),
+            output: home.path().join(nearest_m.to_string()),
+            recipe: Recipe::draft(),
+            scene: Scene {
+                nearest_m,
+                heights_px: vec![64.0],
+                fade: 1.2,
+                ..Scene::default()
+            },
+            wanted: Wanted::Levels(1),
+            accept: true,
+            ..Request::default()
+        };
+        bake(&request, &Work::default()).unwrap();
+        let file = request.output.join("oak.pleach.ron");
+        let manifest = Manifest::from_ron(&std::fs::read_to_string(&file).unwrap(), &file).unwrap();
+        (manifest.files, manifest.levels[1].range.fade_m)
+    };
+    let (all, [from, to]) = files(0.0);
+    assert!(all[0] == "oak_LOD0.glb" && from < to);
+    assert_eq!(files(0.5 * (from + to)).0[0], "oak_LOD0.glb");
+    assert_eq!(files(1.01 * to).0[0], "oak_LOD1.glb");
 }
 
 #[test]

@@ -8,12 +8,14 @@ use super::out::{print, say};
 use super::page;
 use super::progress::{Bars, catch_ctrl_c};
 use super::scene::scene;
+use super::species;
 use crate::batch::Batch;
 use crate::error::{Error, Result};
 use crate::knobs::read;
 use crate::pipeline::{Baked, Limit, Request, Wanted, bake, to_json};
 use crate::recipe::{Preset, Recipe};
 use crate::report::schema::{Bake, Level, Report, Sharing};
+use crate::species::Species;
 use crate::threads::pool;
 use crate::watch::Clock;
 
@@ -33,6 +35,11 @@ pub struct Args {
     /// In a batch: bake again what has not changed.
     #[arg(long)]
     rebake: bool,
+    /// The inputs are trees of one species, which is named after DIR: one package, in which levels that start at one
+    /// size share a page, and cards that look alike share texels, whosever they are (by --sharing, here .01 unless
+    /// said otherwise).
+    #[arg(long, conflicts_with_all = ["batch", "rebake", "instancing", "hierarchy", "page"])]
+    species: bool,
     /// One level for each: a count ("5000") or a share of the original ("10%"), wood included.
     #[arg(long, value_delimiter = ',', value_name = "N|%", value_parser = limit)]
     triangles: Vec<Limit>,
@@ -88,6 +95,13 @@ pub fn run(args: Args) -> Result<()> {
     let started = Instant::now();
     let request = request(&args)?;
     catch_ctrl_c()?;
+    if args.species {
+        let species = Species {
+            inputs: args.inputs,
+            request,
+        };
+        return species::run(&species, args.threads.into(), args.quiet, args.json);
+    }
     if args.batch || args.inputs.len() > 1 {
         if args.page {
             return Err(Error::usage(
@@ -188,10 +202,7 @@ pub(super) fn limit(text: &str) -> std::result::Result<Limit, String> {
 
 /// One line a level.
 fn table(baked: &Baked, took: &Bake, request: &Request) -> String {
-    let mut out = format!(
-        "{:<28}{:>10}{:>7}{:>9}{:>10}{:>7}{:>8}{:>7}{:>7}{:>7}\n",
-        "level", "triangles", "draws", "tex MB", "from m", "at px", "F1", "worst", "E", "area"
-    );
+    let mut out = head();
     let mib = |bytes: u64| bytes as f64 / 1_048_576.0;
     if let Some(original) = &baked.report.original {
         out += &format!(
@@ -267,7 +278,15 @@ fn shared(sharing: &Sharing) -> String {
     out
 }
 
-fn line(level: &Level) -> String {
+/// Names of the columns of [`line`].
+pub(super) fn head() -> String {
+    format!(
+        "{:<28}{:>10}{:>7}{:>9}{:>10}{:>7}{:>8}{:>7}{:>7}{:>7}\n",
+        "level", "triangles", "draws", "tex MB", "from m", "at px", "F1", "worst", "E", "area"
+    )
+}
+
+pub(super) fn line(level: &Level) -> String {
     let head = format!(
         "{:<28}{:>10}{:>7}{:>9.1}{:>10.1}",
         level.file,

@@ -11,6 +11,7 @@ mod page;
 mod plan;
 mod progress;
 mod scene;
+mod species;
 mod study;
 mod sweep;
 mod sweep_table;

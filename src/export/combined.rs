@@ -26,16 +26,57 @@ pub struct Packed {
     pub extras: Value,
     /// Where it is shown.
     pub range: Range,
+    /// Whether the scene comes so near: a level that it never shows is not written.
+    pub shown: bool,
 }
 
-/// Writes all levels, nearest first, into one GLB.
+/// Writes all levels that are shown, nearest first, into one GLB.
 pub fn write_combined(levels: &[Packed], frame: &Frame) -> Result<Vec<u8>> {
     let mut file = FileBuilder::default();
-    let mut nodes = Vec::with_capacity(levels.len());
-    for level in levels {
-        let mesh = file.mesh(&level.name, &level.scene, &level.pngs)?;
-        nodes.push(file.node(&level.name, mesh, frame, level.extras.clone()));
+    let levels: Vec<&Packed> = levels.iter().filter(|l| l.shown).collect();
+    let meshes = levels
+        .iter()
+        .map(|l| file.mesh(&l.name, &l.scene, &l.pngs))
+        .collect::<Result<Vec<usize>>>()?;
+    let first = wired(&mut file, &levels, &meshes, frame);
+    Ok(file.finish(vec![first]))
+}
+
+/// A tree of a species with its levels, nearest first.
+pub struct Stand<'a> {
+    /// "oak".
+    pub name: &'a str,
+    /// Where it stands.
+    pub frame: &'a Frame,
+    /// Its levels.
+    pub levels: &'a [Packed],
+    /// The files of each level's images.
+    pub uris: Vec<Vec<String>>,
+}
+
+/// Writes all levels of all trees into one GLB, a scene for each tree; images are in files of their own.
+pub fn write_species(trees: &[Stand]) -> Result<Vec<u8>> {
+    let mut file = FileBuilder::default();
+    let mut scenes = Vec::with_capacity(trees.len());
+    for tree in trees {
+        let both = tree.levels.iter().zip(&tree.uris);
+        let (levels, uris): (Vec<&Packed>, Vec<_>) = both.filter(|(l, _)| l.shown).unzip();
+        let meshes = levels
+            .iter()
+            .zip(uris)
+            .map(|(l, uris)| file.linked_mesh(&l.name, &l.scene, uris))
+            .collect::<Result<Vec<usize>>>()?;
+        let first = wired(&mut file, &levels, &meshes, tree.frame);
+        scenes.push((tree.name, vec![first]));
     }
+    Ok(file.finish_scenes(&scenes))
+}
+
+/// Adds a node for each level; returns the first, which names the others.
+fn wired(file: &mut FileBuilder, levels: &[&Packed], meshes: &[usize], frame: &Frame) -> usize {
+    let node =
+        |(level, &mesh): (&&Packed, _)| file.node(&level.name, mesh, frame, level.extras.clone());
+    let nodes: Vec<usize> = levels.iter().zip(meshes).map(node).collect();
     let (first, lower) = (nodes[0], &nodes[1..]);
     if !lower.is_empty() {
         file.use_extension("MSFT_lod");
@@ -44,7 +85,7 @@ pub fn write_combined(levels: &[Packed], frame: &Frame) -> Result<Vec<u8>> {
         node["extensions"] = json!({ "MSFT_lod": { "ids": lower } });
         node["extras"]["MSFT_screencoverage"] = json!(coverage);
     }
-    Ok(file.finish(vec![first]))
+    first
 }
 
 /// What a level's node says of itself; numbers that are infinite are left out.

@@ -1,5 +1,6 @@
 //! Bakes the cards of a level: charts, atlas, projected maps, and the mesh that shows them.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
@@ -60,7 +61,7 @@ impl Foliage {
         let (mut charts, size) = lay_out(&cards, sided, options.layout);
         let backs = charts.split_off(groups.len());
         let mut foliage = Self::of(charts, size);
-        foliage.project(model, groups, options.samples);
+        foliage.project(0, model, groups, options.samples);
         foliage.project_backs(model, groups, options.samples, sided, backs);
         foliage.threshold(0.5, 0);
         foliage
@@ -79,11 +80,17 @@ impl Foliage {
         }
     }
 
-    /// Draws each card that has texels of its own; `groups` are the charts' cards.
-    pub(super) fn project(&mut self, model: &Model, groups: &[CardGroup], samples: u32) {
+    /// Draws each card that has texels of its own; `groups` are the cards of the charts from `start` on.
+    pub(super) fn project(
+        &mut self,
+        start: usize,
+        model: &Model,
+        groups: &[CardGroup],
+        samples: u32,
+    ) {
         let [width, _] = self.size;
         // Some cards at a time: projections are several times as large as what is kept of them.
-        for (groups, charts) in groups.chunks(BATCH).zip(self.charts.chunks(BATCH)) {
+        for (groups, charts) in groups.chunks(BATCH).zip(self.charts[start..].chunks(BATCH)) {
             let own = groups.par_iter().zip(charts);
             let projected: Vec<_> = own
                 .filter(|(_, chart)| chart.shape != Shape::Window)
@@ -176,14 +183,14 @@ impl Foliage {
         fill(Stored::orm, Stored::set_orm);
     }
 
-    /// The cards as a mesh with normals, tangents and atlas coordinates.
-    pub fn surface(&self) -> Surface {
+    /// Some of the cards as a mesh with normals, tangents and atlas coordinates.
+    pub fn surface(&self, charts: Range<usize>) -> Surface {
         let mut out = Surface {
             name: "foliage".into(),
             ..Surface::default()
         };
         let scale = Vec2::new(1.0 / self.size[0] as f32, 1.0 / self.size[1] as f32);
-        for chart in &self.charts {
+        for chart in &self.charts[charts] {
             let base = out.positions.len() as u32;
             for &corner in &chart.corners {
                 out.positions.push(corner);

@@ -27,6 +27,20 @@ pub fn write_glb(
     Ok(file.finish(vec![node]))
 }
 
+/// Writes `scene` as [`write_glb`] does, with images in files of their own (`uris`).
+pub fn write_linked(
+    name: &str,
+    scene: &Scene,
+    uris: &[String],
+    frame: &Frame,
+    extras: &Value,
+) -> Result<Vec<u8>> {
+    let mut file = FileBuilder::default();
+    let mesh = file.linked_mesh(name, scene, uris)?;
+    let node = file.node(name, mesh, frame, extras.clone());
+    Ok(file.finish(vec![node]))
+}
+
 /// Collects what goes into one file; several levels may share it.
 #[derive(Default)]
 pub struct FileBuilder {
@@ -50,6 +64,12 @@ impl FileBuilder {
     /// Images and materials that an earlier mesh has brought are shared.
     pub fn mesh(&mut self, name: &str, scene: &Scene, pngs: &[Vec<u8>]) -> Result<usize> {
         let materials = self.materials(scene, pngs);
+        self.mesh_of(name, &scene.surfaces, &scene.materials, &materials)
+    }
+
+    /// [`FileBuilder::mesh`] with images in files of their own (`uris`).
+    pub fn linked_mesh(&mut self, name: &str, scene: &Scene, uris: &[String]) -> Result<usize> {
+        let materials = self.linked_materials(scene, &scene.surfaces, uris);
         self.mesh_of(name, &scene.surfaces, &scene.materials, &materials)
     }
 

@@ -1,5 +1,7 @@
 //! A level as the raster draws it, to try many alphas: the wood is drawn once, cards over it.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use super::foliage::Foliage;
@@ -95,8 +97,8 @@ impl WoodSeen {
 }
 
 impl LevelScene {
-    /// The cards of `foliage` with its alpha, and the wood.
-    pub fn new(foliage: &Foliage, wood: &[Surface]) -> Self {
+    /// Those cards of `foliage` that are the tree's, with the page's alpha, and the wood.
+    pub fn new(foliage: &Foliage, charts: Range<usize>, wood: &[Surface]) -> Self {
         let mut tubes = Surface::default();
         for part in wood {
             let base = tubes.positions.len() as u32;
@@ -118,7 +120,7 @@ impl LevelScene {
         };
         Self {
             cards: Part {
-                surface: foliage.surface(),
+                surface: foliage.surface(charts),
                 materials: [cut],
                 textures: vec![Texture::from_alpha(w, h, foliage.alpha.clone())],
             },

@@ -47,6 +47,10 @@ pub struct Manifest {
     pub subtree_texels: u32,
     /// The hierarchy of sub-trees: parents before children; 0 is the whole tree.
     pub subtrees: Vec<Subtree>,
+    /// The species whose trees share pages, which name the package's folder had; empty where a tree was baked
+    /// alone.
+    #[serde(default)]
+    pub species: String,
     /// How much of each sub-tree is seen; only with `--hierarchy`.
     #[serde(default)]
     pub visibility: Option<Visibility>,
@@ -107,7 +111,7 @@ pub struct Original {
 pub struct Level {
     /// Number; 0 is the original.
     pub level: u32,
-    /// The file that holds it alone.
+    /// The file that holds it alone; empty for a level 0 that the scene never comes near enough to show.
     pub file: String,
     /// Triangles, wood included.
     pub triangles: u64,
@@ -158,6 +162,9 @@ pub struct Card {
     /// Sharing reference: the card of this level that has most of the texels that this one shows; `None` where they
     /// are its own.
     pub copy_of: Option<u32>,
+    /// The tree whose card that is, where it is another one of the same species; see [`Manifest::species`].
+    #[serde(default)]
+    pub copy_in: Option<String>,
     /// Triangles of the original that it shows.
     pub shows: u32,
     /// Root of the area-weighted mean squared distance from what it shows to the card.

@@ -81,6 +81,8 @@ fn of_level(index: usize, level: &Level, subtrees: usize) -> Option<(String, Str
             let mut cards = level.cards.iter().enumerate();
             let own = |tile: u32| level.cards.get(tile as usize).map(|c| c.copy_of);
             cards.find_map(|(i, card)| match own(card.copy_of?) {
+                // Of another tree, which has a manifest of its own.
+                _ if card.copy_in.is_some() => None,
                 Some(None) => None,
                 _ => Some((
                     at(&format!("cards[{i}].copy_of")),

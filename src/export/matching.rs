@@ -7,6 +7,8 @@
 //! threshold that gives the right area near; the contrast is searched whose area at the level's
 //! own distance and at twice it errs as little to one side as to the other.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use super::foliage::Foliage;
@@ -62,13 +64,35 @@ const RANGE: [f32; 2] = [0.02, 0.005];
 /// What areas from afar grow by with a step of contrast: on an oak's levels it is .0005 to .0007.
 const AREA_A_STEP: f64 = 5e-4;
 
-/// Sets the alpha of `foliage` from `score` so that cards and `wood` together cover what the
-/// original covers; the search begins at the contrast `guess`.
+/// A tree that has cards on the page.
+#[derive(Clone, Debug)]
+pub struct Standing<'a> {
+    /// Its charts.
+    pub charts: Range<usize>,
+    /// Its wood.
+    pub wood: &'a [Surface],
+    /// What it should cover.
+    pub goal: &'a AreaGoal,
+}
+
+/// The trees of a page, ready to be drawn with other alphas.
+struct Stand<'a> {
+    goal: &'a AreaGoal,
+    level: LevelScene,
+    seen: WoodSeen,
+}
+
+/// A sum over all trees.
+fn sum<T>(all: &[T], of: impl Fn(&T) -> f64) -> f64 {
+    all.iter().map(of).sum()
+}
+
+/// Sets the alpha of `foliage` from `score` so that cards and wood of all its trees together cover what
+/// their originals cover; the search begins at the contrast `guess`.
 pub fn match_area(
     foliage: &mut Foliage,
     mut score: Vec<f32>,
-    wood: &[Surface],
-    goal: &AreaGoal,
+    trees: &[Standing],
     guess: i32,
 ) -> Matched {
     let mut found = Matched {
@@ -83,8 +107,20 @@ pub fn match_area(
     }
     let [width, height] = foliage.size;
     let page = ScorePage::new(width, height, score);
-    let mut level = LevelScene::new(foliage, wood);
-    let seen = WoodSeen::new(&level, goal);
+    let stand = |tree: &Standing<'_>| {
+        let level = LevelScene::new(foliage, tree.charts.clone(), tree.wood);
+        (WoodSeen::new(&level, tree.goal), level)
+    };
+    let mut stands: Vec<Stand> = Vec::with_capacity(trees.len());
+    for tree in trees {
+        let (seen, level) = stand(tree);
+        let goal = tree.goal;
+        stands.push(Stand { goal, level, seen });
+    }
+    let [own_area, far_area] = [
+        sum(&stands, |s| s.goal.own_area),
+        sum(&stands, |s| s.goal.far_area),
+    ];
     let search = Search {
         range: [-HIGHEST_CONTRAST, HIGHEST_CONTRAST],
         guess: guess.into(),
@@ -105,11 +141,15 @@ pub fn match_area(
             alphas: found.alphas(),
             range: [found.threshold - range, found.threshold + range],
         };
-        (found.threshold, found.near_ratio) = threshold(&level, &seen, scores, goal);
+        (found.threshold, found.near_ratio) = threshold(&stands, scores);
         apply(foliage, &page, found);
-        level.set_alpha(&foliage.alpha);
-        found.own_ratio = level.client_area(&goal.own, &seen.own) / goal.own_area.max(1e-9);
-        found.far_ratio = level.client_area(&goal.far, &seen.far) / goal.far_area.max(1e-9);
+        for stand in &mut stands {
+            stand.level.set_alpha(&foliage.alpha);
+        }
+        let own = sum(&stands, |s| s.level.client_area(&s.goal.own, &s.seen.own));
+        let far = sum(&stands, |s| s.level.client_area(&s.goal.far, &s.seen.far));
+        found.own_ratio = own / own_area.max(1e-9);
+        found.far_ratio = far / far_area.max(1e-9);
         1.0 - (found.own_ratio + found.far_ratio) / 2.0
     });
     found
@@ -132,16 +172,22 @@ fn apply(foliage: &mut Foliage, page: &ScorePage, found: Matched) {
 
 /// The threshold at which the area near is the original's, and the area over it; looked for in the
 /// scores' range first.
-fn threshold(level: &LevelScene, seen: &WoodSeen, scores: Scores, goal: &AreaGoal) -> (f32, f64) {
+fn threshold(stands: &[Stand], scores: Scores) -> (f32, f64) {
+    let wanted = sum(stands, |s| s.goal.near_area);
     let within = |range: [f32; 2]| {
         let scores = Scores { range, ..scores };
-        let mut pixels = level.critical(&goal.near, &seen.near, scores);
-        at_count(&mut pixels, range, goal.near_area)
+        let mut pixels = Critical::default();
+        for Stand { level, goal, seen } in stands {
+            let own = level.critical(&goal.near, &seen.near, scores);
+            pixels.above += own.above;
+            pixels.within.extend(own.within);
+        }
+        at_count(&mut pixels, range, wanted)
     };
     let all = [f32::NEG_INFINITY, f32::INFINITY];
     let found = within(scores.range).or_else(|| within(all));
     let (threshold, covered) = found.unwrap_or((THRESHOLDS[0], 0));
-    (threshold, covered as f64 / goal.near_area.max(1e-9))
+    (threshold, covered as f64 / wanted.max(1e-9))
 }
 
 /// The threshold at which as many pixels are covered as `wanted`, and how many are; `None` where it
@@ -245,7 +291,12 @@ mod tests {
             far,
             far_area,
         };
-        match_area(&mut foliage, score, &[], &goal, CONTRAST_GUESS)
+        let tree = Standing {
+            charts: 0..foliage.charts.len(),
+            wood: &[],
+            goal: &goal,
+        };
+        match_area(&mut foliage, score, &[tree], CONTRAST_GUESS)
     }
 
     /// 0 to 9, alike over 3 x 3 texels.

@@ -1,5 +1,7 @@
 //! The original's silhouettes, rendered once and pooled for every level.
 
+use std::ops::Range;
+
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
@@ -138,8 +140,9 @@ impl Original {
             .collect()
     }
 
-    /// Targets with cells of `pool` x `pool` samples; `taken` draws what covers cells beside cards.
-    pub fn targets(&self, pool: u32, wood: Option<&Scene>) -> Vec<Target> {
+    /// Targets with cells of `pool` x `pool` samples for the tree's `charts`; `wood` is what covers cells
+    /// beside these.
+    pub fn targets(&self, pool: u32, wood: Option<&Scene>, charts: Range<usize>) -> Vec<Target> {
         self.directions
             .par_iter()
             .zip(&self.masks)
@@ -162,6 +165,7 @@ impl Original {
                     size,
                     wanted: pooled((0..mask.height).map(|y| mask.row(y)), size, pool),
                     taken,
+                    charts: charts.clone(),
                 }
             })
             .collect()

@@ -11,6 +11,7 @@
 //! The mean vote is added to the projected coverage and thresholded; a few rounds let cards
 //! agree. Views are orthographic, so a card's texels map to cells by one affine map a view.
 
+use std::ops::Range;
 use std::sync::LazyLock;
 
 use glam::{Vec2, Vec3};
@@ -35,6 +36,8 @@ pub struct Target {
     pub wanted: Vec<bool>,
     /// Whether geometry that is not on cards (tubes) covers the cell already.
     pub taken: Vec<bool>,
+    /// The charts that are seen: those of this tree, where several share a page.
+    pub charts: Range<usize>,
 }
 
 /// Settings of the fit.
@@ -50,7 +53,7 @@ pub struct Refine {
 const BATCH: usize = 512;
 
 /// For each texel of the page, the projected coverage corrected by the views' votes.
-pub fn refine(foliage: &Foliage, targets: &[Target], options: Refine) -> Vec<f32> {
+pub fn refine(foliage: &Foliage, targets: &[&Target], options: Refine) -> Vec<f32> {
     let mut score: Vec<f32> = foliage.texels.iter().map(Stored::coverage).collect();
     let mut mean = vec![0.0f32; score.len()];
     let rows: Vec<Vec<u32>> = foliage.charts.iter().map(Chart::row_lengths).collect();
@@ -63,10 +66,10 @@ pub fn refine(foliage: &Foliage, targets: &[Target], options: Refine) -> Vec<f32
         // work, and on three trees no F1 fell by more than .004.
         let turns = options.rounds.min(3) as usize;
         let turn = round as usize % turns;
-        let asked: Vec<&Target> = targets.iter().skip(turn).step_by(turns).collect();
+        let asked: Vec<&Target> = targets.iter().skip(turn).step_by(turns).copied().collect();
         let opinions: Vec<Vec<u8>> = asked
             .par_iter()
-            .map(|target| opinions(target, on.count(target)))
+            .map(|target| opinions(target, on.count(target, &target.charts)))
             .collect();
         // Later rounds move less, so that two cards do not swap a cell for ever.
         let step = 1.0 / (round as f32 + 1.0).sqrt();
@@ -127,13 +130,19 @@ impl<'f> Shown<'f> {
         }
     }
 
-    /// How many opaque texels each cell sees, at most 255.
-    fn count(&self, target: &Target) -> Vec<u8> {
+    /// How many opaque texels of some charts each cell sees, at most 255.
+    fn count(&self, target: &Target, charts: &Range<usize>) -> Vec<u8> {
         let mut counts = vec![0u8; target.wanted.len()];
-        for ((chart, rows), on) in self.foliage.charts.iter().zip(self.rows).zip(&self.on) {
-            scan(chart, rows, target, |cell, texel| {
-                counts[cell] = counts[cell].saturating_add(u8::from(on[texel]));
-            });
+        for i in charts.clone() {
+            let on = &self.on[i];
+            scan(
+                &self.foliage.charts[i],
+                &self.rows[i],
+                target,
+                |cell, texel| {
+                    counts[cell] = counts[cell].saturating_add(u8::from(on[texel]));
+                },
+            );
         }
         counts
     }
@@ -148,8 +157,11 @@ impl<'f> Shown<'f> {
         let charts = &self.foliage.charts;
         for first in (0..charts.len()).step_by(BATCH) {
             let some = first..(first + BATCH).min(charts.len());
-            let of_chart =
-                |i: usize| vote((&charts[i], &self.rows[i]), targets, opinions, &self.on[i]);
+            let of_chart = |i: usize| {
+                let seen = targets.iter().copied().zip(opinions);
+                let seen = seen.filter(|(target, _)| target.charts.contains(&i));
+                vote((&charts[i], &self.rows[i]), seen, &self.on[i])
+            };
             let votes: Vec<Vec<Votes>> = some.clone().into_par_iter().map(of_chart).collect();
             for (i, votes) in some.zip(votes) {
                 let chart = &charts[i];
@@ -192,13 +204,13 @@ fn follow_neighbours(score: &mut [f32], foliage: &Foliage) {
     }
 }
 
-/// F1 of the cards and of what is there beside them against the original, mean over the views; a
+/// F1 of some cards and of what is there beside them against their original, mean over its views; a
 /// texel is opaque from half on.
-pub fn f1(foliage: &Foliage, targets: &[Target]) -> f64 {
+pub fn f1(foliage: &Foliage, charts: Range<usize>, targets: &[Target]) -> f64 {
     let rows: Vec<Vec<u32>> = foliage.charts.iter().map(Chart::row_lengths).collect();
     let on = Shown::new(foliage, &rows, |at| foliage.alpha[at] >= 128);
     let of_view = |target: &Target| {
-        let counts = on.count(target);
+        let counts = on.count(target, &charts);
         let cells = target.wanted.iter().zip(&target.taken).zip(counts);
         let (mut both, mut any) = (0u64, 0u64);
         for ((&wanted, &taken), count) in cells {
@@ -244,15 +256,14 @@ fn opinions(target: &Target, mut counts: Vec<u8>) -> Vec<u8> {
     counts
 }
 
-fn vote(
+fn vote<'t>(
     (chart, rows): (&Chart, &[u32]),
-    targets: &[&Target],
-    opinions: &[Vec<u8>],
+    seen: impl Iterator<Item = (&'t Target, &'t Vec<u8>)>,
     on: &[bool],
 ) -> Vec<Votes> {
     let mut sums = vec![(0.0f32, 0u32); on.len()];
     let said = &*SAID;
-    for (target, opinions) in targets.iter().zip(opinions) {
+    for (target, opinions) in seen {
         scan(chart, rows, target, |cell, texel| {
             let (sum, hits) = &mut sums[texel];
             *sum += said[usize::from(opinions[cell])][usize::from(on[texel])];
@@ -321,6 +332,7 @@ mod tests {
             size: [6, 1],
             wanted: vec![true, true, true, false, false, true],
             taken: vec![false, false, false, false, false, true],
+            charts: 0..1,
         };
         let numbers = opinions(&target, vec![0, 1, 4, 0, 2, 0]);
         let said: Vec<[f32; 2]> = numbers.iter().map(|&n| SAID[usize::from(n)]).collect();
@@ -342,6 +354,7 @@ mod tests {
             size: [4, 1],
             wanted: wanted.to_vec(),
             taken: taken.to_vec(),
+            charts: 0..1,
         };
         let (yes, no) = (true, false);
         // Three wanted, two covered, one of them wanted: 2 * 1 / (3 + 2).
@@ -349,7 +362,7 @@ mod tests {
         // All right.
         let all = target([yes, no, no, no], [yes, no, no, no]);
         let nothing = Foliage::default();
-        assert!((f1(&nothing, std::slice::from_ref(&some)) - 0.4).abs() < 1e-12);
-        assert!((f1(&nothing, &[some, all]) - 0.7).abs() < 1e-12);
+        assert!((f1(&nothing, 0..0, std::slice::from_ref(&some)) - 0.4).abs() < 1e-12);
+        assert!((f1(&nothing, 0..0, &[some, all]) - 0.7).abs() < 1e-12);
     }
 }

@@ -4,7 +4,7 @@
 //! is missing from whole views; a billboard shows each leaf on two cards. Between the two nothing but
 //! the pictures decides: at 48 triangles the cut of EZ-Tree's oak has an F1 of .844.
 
-use super::fit::{Fitted, merge_wood, wood_scene};
+use super::fit::Fitted;
 use super::{Baker, LevelRequest};
 use crate::detail::whole_tree::whole_tree;
 use crate::error::Result;
@@ -39,9 +39,8 @@ impl Baker<'_> {
 
     /// F1 against the original's silhouettes, mean over the training views.
     fn agreement(&self, fitted: &Fitted) -> f64 {
-        let taken = merge_wood(&fitted.wood);
-        let pool = self.pool(fitted.request);
-        let targets = self.original.targets(pool, Some(&wood_scene(&taken)));
-        f1(&fitted.foliage, &targets)
+        let charts = 0..fitted.foliage.charts.len();
+        let targets = self.targets(fitted, charts.clone());
+        f1(&fitted.foliage, charts, &targets)
     }
 }

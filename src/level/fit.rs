@@ -1,17 +1,20 @@
 //! The texels of a level: projected, fitted to the original's silhouettes, matched in area.
 
+use std::ops::Range;
+
 use glam::Vec2;
 
 use super::{Baker, Level, LevelRequest};
+use crate::botany::model::Image;
 use crate::detail::level::LevelPlan;
 use crate::error::Result;
 use crate::export::atlas::Layout;
 use crate::export::enough::enough;
 use crate::export::foliage::{self, BakeOptions, Foliage};
 use crate::export::level_scene::{AreaGoal, LevelScene};
-use crate::export::matching::{CONTRAST_GUESS, Matched, match_area};
+use crate::export::matching::{CONTRAST_GUESS, Matched, Standing, match_area};
 use crate::export::original::{Original, camera};
-use crate::export::refine::{Refine, refine};
+use crate::export::refine::{Refine, Target, refine};
 use crate::export::surface::{Scene, Surface, scene_of_wood};
 use crate::space::raster::{self, Camera};
 use crate::watch::{Watch, part};
@@ -40,6 +43,7 @@ const WOOD_TOLERANCE: f64 = 0.005;
 const GAP_PX: f32 = 0.25;
 
 /// A plan with its wood and texels.
+#[derive(Clone)]
 pub struct Fitted {
     pub(super) request: LevelRequest,
     pub(super) plan: LevelPlan,
@@ -86,7 +90,10 @@ impl Baker<'_> {
             part(watch, "wood")?;
             let wood = self.wood(&plan, request, radius_scale);
             let taken = merge_wood(&wood);
-            let targets = self.original.targets(pool, Some(&wood_scene(&taken)));
+            let charts = 0..foliage.charts.len();
+            let taken = wood_scene(&taken);
+            let targets = self.original.targets(pool, Some(&taken), charts.clone());
+            let targets: Vec<&Target> = targets.iter().collect();
             part(watch, "fit texels")?;
             let score = refine(&foliage, &targets, self.refining());
             part(watch, "match area")?;
@@ -94,7 +101,12 @@ impl Baker<'_> {
                 true => score.clone(),
                 false => Vec::new(),
             };
-            let matched = match_area(&mut foliage, score, &wood.surfaces, &goal, guess);
+            let standing = Standing {
+                charts,
+                wood: &wood.surfaces,
+                goal: &goal,
+            };
+            let matched = match_area(&mut foliage, score, &[standing], guess);
             tries += 1;
             guess = matched.contrast;
             let over = matched.near_ratio;
@@ -111,6 +123,14 @@ impl Baker<'_> {
             }
             radius_scale /= over.min(1.25) as f32;
         }
+    }
+
+    /// The original's views for a fitted level, some of whose page's charts are the tree's.
+    pub(super) fn targets(&self, fitted: &Fitted, charts: Range<usize>) -> Vec<Target> {
+        let taken = merge_wood(&fitted.wood);
+        let pool = self.pool(fitted.request);
+        let taken = wood_scene(&taken);
+        self.original.targets(pool, Some(&taken), charts)
     }
 
     /// Texels a normalised unit.
@@ -181,7 +201,8 @@ impl Fitted {
     /// The least covered area of all training views, over the original's.
     pub(super) fn least_view(&self, original: &Original) -> f64 {
         let unit = near_height_px(self.request) / original.height;
-        let level = LevelScene::new(&self.foliage, &self.wood.surfaces);
+        let charts = 0..self.foliage.charts.len();
+        let level = LevelScene::new(&self.foliage, charts, &self.wood.surfaces);
         let cameras: Vec<Camera> = original
             .directions
             .iter()
@@ -198,19 +219,13 @@ impl Fitted {
     }
 
     /// Bleeds the texels and joins wood and cards.
-    pub(super) fn level(mut self, tree_height: f32) -> Level {
+    pub fn level(mut self, tree_height: f32) -> Level {
         self.foliage
             .add_backs(GAP_PX * tree_height / self.request.height_px);
         self.foliage.bleed();
-        let mut scene = self.wood;
-        let mut surface = self.foliage.surface();
-        surface.material = scene.materials.len() as u32;
-        let material = foliage::material(scene.images.len() as u32);
-        scene.materials.push(material);
-        scene.images.extend(self.foliage.images());
-        scene.surfaces.push(surface);
+        let surface = self.foliage.surface(0..self.foliage.charts.len());
         Level {
-            scene,
+            scene: on_page(self.wood, surface, self.foliage.images()),
             request: self.request,
             plan: self.plan,
             matched: self.matched,
@@ -220,9 +235,31 @@ impl Fitted {
             shared: Vec::new(),
         }
     }
+
+    /// Width and height of its page, texels.
+    pub fn page_size(&self) -> [u32; 2] {
+        self.foliage.size
+    }
+
+    /// What the fit wants of each texel, 0 transparent and 1 opaque; where the level was fitted for sharing.
+    pub(super) fn opacity(&self) -> Vec<f32> {
+        let opaque = |score: &f32| (score - self.matched.threshold + 0.5).clamp(0.0, 1.0);
+        self.score.iter().map(opaque).collect()
+    }
 }
 
-pub(super) fn merge_wood(scene: &Scene) -> Surface {
+/// Wood with cards, whose images come last.
+pub(super) fn on_page(wood: Scene, mut cards: Surface, images: [Image; 3]) -> Scene {
+    let mut scene = wood;
+    cards.material = scene.materials.len() as u32;
+    let material = foliage::material(scene.images.len() as u32);
+    scene.materials.push(material);
+    scene.images.extend(images);
+    scene.surfaces.push(cards);
+    scene
+}
+
+fn merge_wood(scene: &Scene) -> Surface {
     let mut out = Surface::default();
     for s in &scene.surfaces {
         let base = out.positions.len() as u32;
@@ -234,7 +271,7 @@ pub(super) fn merge_wood(scene: &Scene) -> Surface {
     out
 }
 
-pub(super) fn wood_scene(surface: &Surface) -> raster::Scene<'_> {
+fn wood_scene(surface: &Surface) -> raster::Scene<'_> {
     const OPAQUE: [raster::Material; 1] = [raster::Material {
         texture: None,
         uv_set: 0,

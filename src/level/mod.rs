@@ -31,7 +31,8 @@ use crate::ladder::{Rung, WHOLE_TREE_TRIANGLES};
 use crate::recipe::{Billboard, Method, Recipe};
 use crate::watch::{Watch, part};
 
-pub use fit::MASK_HEIGHT;
+pub use fit::{Fitted, MASK_HEIGHT};
+pub use share::{Guest, Page, Table, half};
 
 /// What every level of a tree is baked from.
 pub struct Baker<'a> {
@@ -147,44 +148,49 @@ impl Baker<'_> {
     /// # Errors
     /// [`Error::Interrupted`](crate::error::Error::Interrupted).
     pub fn level(&self, request: LevelRequest, watch: &dyn Watch) -> Result<Level> {
+        match self.fitted(request, watch)? {
+            Some(fitted) => self.finished(fitted, watch),
+            None => Ok(self.original_itself(request)),
+        }
+    }
+
+    /// A level with its wood and texels; `None`: the original fits into the budget as it is.
+    ///
+    /// # Errors
+    /// [`Error::Interrupted`](crate::error::Error::Interrupted).
+    pub fn fitted(&self, request: LevelRequest, watch: &dyn Watch) -> Result<Option<Fitted>> {
         part(watch, "cut")?;
         if self.recipe.method == Method::CrossedQuads {
             let count = (request.triangles / 2).clamp(1, MOST_CROSSED) as usize;
             let plan = crossed_quads(&self.tree.model, self.elements, count);
-            return self.finished(self.fit(plan, request, watch)?, watch);
+            return self.fit(plan, request, watch).map(Some);
         }
-        if request.triangles >= self.tree.model.triangles.len() as u64 {
-            return Ok(self.original_itself(request));
+        let model = &self.tree.model;
+        if request.triangles >= model.triangles.len() as u64 {
+            return Ok(None);
         }
         let Some(plan) = self.cut(request) else {
-            let plan = whole_tree(
-                &self.tree.model,
-                self.elements,
-                &self.radii(),
-                request.triangles,
-            );
-            return self.finished(self.fit(plan, request, watch)?, watch);
+            let plan = whole_tree(model, self.elements, &self.radii(), request.triangles);
+            return self.fit(plan, request, watch).map(Some);
         };
         let made = self.fit(plan, request, watch)?;
         let made = self.nearer(made, request, watch)?;
         let least = made.least_view(self.original);
         if least >= LEAST_VIEW {
-            return self.finished(made, watch);
+            return Ok(Some(made));
         }
         // Curtains of weeping twigs have upright planes, and seen from above these are lines.
         part(watch, "cut")?;
-        match self.cut_with_level_cards(request) {
-            Some(plan) => {
-                let other = self.fit(plan, request, watch)?;
-                let better = other.least_view(self.original) > least;
-                self.finished(if better { other } else { made }, watch)
-            }
-            None => self.finished(made, watch),
-        }
+        let Some(plan) = self.cut_with_level_cards(request) else {
+            return Ok(Some(made));
+        };
+        let other = self.fit(plan, request, watch)?;
+        let better = other.least_view(self.original) > least;
+        Ok(Some(if better { other } else { made }))
     }
 
     /// The level of a tree that fits into its budget as it is: nothing is nearer.
-    fn original_itself(&self, request: LevelRequest) -> Level {
+    pub fn original_itself(&self, request: LevelRequest) -> Level {
         let model = &self.tree.model;
         Level {
             scene: scene_of_model(model, 0..model.triangles.len() as u32),

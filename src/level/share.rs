@@ -1,10 +1,15 @@
-//! Levels whose cards share texels.
+//! Levels whose cards share texels: those of one tree, or of several trees on one page.
 
-use super::fit::{Fitted, merge_wood, wood_scene};
+use std::ops::Range;
+
+use super::fit::{Fitted, on_page};
 use super::{Baker, Level};
 use crate::error::Result;
-use crate::export::matching::match_area;
-use crate::export::refine::{f1, refine};
+use crate::export::atlas::MAX_SIDE;
+use crate::export::foliage::Foliage;
+use crate::export::level_scene::AreaGoal;
+use crate::export::matching::{CONTRAST_GUESS, Matched, Standing, match_area};
+use crate::export::refine::{Target, f1, refine};
 use crate::export::share::{self, Cards, Plan};
 use crate::watch::{Watch, part};
 
@@ -15,66 +20,34 @@ const PASSES: f64 = 6.0;
 impl Baker<'_> {
     /// A level with all that shares its texels.
     pub(super) fn finished(&self, fitted: Fitted, watch: &dyn Watch) -> Result<Level> {
-        let height = self.original.height;
         let shared = self.shared(&fitted, watch)?;
         Ok(Level {
-            shared: shared.into_iter().rev().map(|f| f.level(height)).collect(),
-            ..fitted.level(height)
+            shared,
+            ..fitted.level(self.original.height)
         })
     }
 
-    /// The level on pages of half the size, a quarter and so on, while it may lose no more
-    /// than the recipe allows.
-    fn shared(&self, fitted: &Fitted, watch: &dyn Watch) -> Result<Vec<Fitted>> {
+    /// The level on pages of half the size, a quarter and so on, the smallest first, while it may lose no
+    /// more than the recipe allows.
+    fn shared(&self, fitted: &Fitted, watch: &dyn Watch) -> Result<Vec<Level>> {
         let mut out = Vec::new();
         if self.recipe.sharing == 0.0 || fitted.foliage.charts.len() < 2 {
             return Ok(out);
         }
         part(watch, "share")?;
-        let taken = merge_wood(&fitted.wood);
-        let pool = self.pool(fitted.request);
-        let targets = self.original.targets(pool, Some(&wood_scene(&taken)));
-        let goal = self.goal(fitted.request);
-        let least = f1(&fitted.foliage, &targets) - PASSES * self.recipe.sharing;
-        let cards = Cards {
-            model: &self.tree.model,
-            groups: &fitted.plan.cards,
-            samples: self.recipe.samples,
-            pad: self.recipe.gutter_texels,
-        };
-        let opacity: Vec<f32> = fitted
-            .score
-            .iter()
-            .map(|score| (score - fitted.matched.threshold + 0.5).clamp(0.0, 1.0))
-            .collect();
-        let wanted = share::Fitted {
-            foliage: &fitted.foliage,
-            opacity: &opacity,
-        };
+        let guests = [Guest {
+            baker: self,
+            fitted,
+        }];
+        let table = Table::new(&guests);
         let mut size = fitted.foliage.size;
-        while let Some(plan) =
-            half(&mut size).and_then(|()| Plan::new(cards, self.density(fitted.request), size))
-        {
-            part(watch, "share")?;
-            let Some(mut foliage) = plan.share(cards, wanted) else {
-                break;
-            };
-            let score = refine(&foliage, &targets, self.refining());
-            let wood = &fitted.wood.surfaces;
-            let matched = match_area(&mut foliage, score, wood, &goal, fitted.matched.contrast);
-            if f1(&foliage, &targets) < least {
-                break;
+        while half(&mut size) {
+            match table.seat(size, watch)? {
+                Some(page) => out.extend(page.levels(&guests)),
+                None => break,
             }
-            out.push(Fitted {
-                request: fitted.request,
-                plan: fitted.plan.clone(),
-                wood: fitted.wood.clone(),
-                foliage,
-                matched,
-                density: plan.density,
-                score: Vec::new(),
-            });
         }
+        out.reverse();
         Ok(out)
     }
 }
@@ -82,9 +55,175 @@ impl Baker<'_> {
 /// A page's fewest texels along a side.
 const LEAST_SIDE: u32 = 16;
 
-/// Halves the longer side.
-fn half(size: &mut [u32; 2]) -> Option<()> {
+/// Halves the longer side, if it may.
+pub fn half(size: &mut [u32; 2]) -> bool {
     let longer = usize::from(size[1] > size[0]);
     size[longer] /= 2;
-    (size[longer] >= LEAST_SIDE).then_some(())
+    size[longer] >= LEAST_SIDE
+}
+
+/// A level that shares a page with those of other trees.
+#[derive(Clone, Copy)]
+pub struct Guest<'a> {
+    /// Its tree.
+    pub baker: &'a Baker<'a>,
+    /// The level on a page of its own.
+    pub fitted: &'a Fitted,
+}
+
+/// Levels that are to share a page, and what fits them to it.
+pub struct Table<'a> {
+    guests: &'a [Guest<'a>],
+    /// What each level's fit wants of its texels.
+    opacity: Vec<Vec<f32>>,
+    /// Which charts are whose.
+    charts: Vec<Range<usize>>,
+    /// Views of each tree.
+    targets: Vec<Vec<Target>>,
+    goals: Vec<AreaGoal>,
+    /// Least F1 of each in the fit's own measure.
+    least: Vec<f64>,
+}
+
+impl<'a> Table<'a> {
+    /// Draws what the fit looks at; `guests` were fitted for sharing.
+    pub fn new(guests: &'a [Guest<'a>]) -> Self {
+        let mut charts: Vec<Range<usize>> = Vec::with_capacity(guests.len());
+        for guest in guests {
+            let start = charts.last().map_or(0, |c| c.end);
+            charts.push(start..start + guest.fitted.foliage.charts.len());
+        }
+        let both = || guests.iter().zip(&charts);
+        let targets: Vec<Vec<Target>> = both()
+            .map(|(guest, charts)| guest.baker.targets(guest.fitted, charts.clone()))
+            .collect();
+        let least = |(guest, targets): (&Guest, &Vec<Target>)| {
+            let own = &guest.fitted.foliage;
+            f1(own, 0..own.charts.len(), targets) - PASSES * guest.baker.recipe.sharing
+        };
+        let least = guests.iter().zip(&targets).map(least).collect();
+        let goal = |guest: &Guest| guest.baker.goal(guest.fitted.request);
+        Self {
+            guests,
+            opacity: guests.iter().map(|g| g.fitted.opacity()).collect(),
+            charts,
+            targets,
+            goals: guests.iter().map(goal).collect(),
+            least,
+        }
+    }
+
+    /// The smallest page on which every card has a tile as fine as it should be; where there is none the largest
+    /// page there is.
+    pub fn whole_page(&self) -> [u32; 2] {
+        let area = |g: &Guest| g.fitted.foliage.size.map(u64::from).iter().product::<u64>();
+        // Together they never need less than half of what they have: pages are half full at least.
+        let least = self.guests.iter().map(area).sum::<u64>() / 4;
+        let cards = self.cards();
+        let mut size = [LEAST_SIDE; 2];
+        let complete = |size| Plan::new(&cards, size).is_some_and(|plan| plan.is_complete());
+        while u64::from(size[0]) * u64::from(size[1]) < least || !complete(size) {
+            if size == [MAX_SIDE; 2] {
+                break;
+            }
+            let shorter = usize::from(size[1] < size[0]);
+            size[shorter] *= 2;
+        }
+        size
+    }
+
+    /// The levels on a page of this size; `None` where it doesn't hold most of them, or where one may lose
+    /// more than its recipe allows.
+    pub fn seat(&self, size: [u32; 2], watch: &dyn Watch) -> Result<Option<Page>> {
+        part(watch, "share")?;
+        let cards = self.cards();
+        let Some(plan) = Plan::new(&cards, size) else {
+            return Ok(None);
+        };
+        let Some(mut foliage) = plan.share(&cards) else {
+            return Ok(None);
+        };
+        part(watch, "share")?;
+        let refining = self.guests[0].baker.refining();
+        let targets: Vec<&Target> = self.targets.iter().flatten().collect();
+        let score = refine(&foliage, &targets, refining);
+        let both = self.guests.iter().zip(&self.charts).zip(&self.goals);
+        let stand = |((guest, charts), goal): ((&'a Guest<'a>, &Range<usize>), _)| Standing {
+            charts: charts.clone(),
+            wood: &guest.fitted.wood.surfaces,
+            goal,
+        };
+        let standing: Vec<Standing> = both.map(stand).collect();
+        let guess = match self.guests {
+            [only] => only.fitted.matched.contrast,
+            _ => CONTRAST_GUESS,
+        };
+        let matched = match_area(&mut foliage, score, &standing, guess);
+        let good = |(i, &least): (usize, &f64)| {
+            f1(&foliage, self.charts[i].clone(), &self.targets[i]) >= least
+        };
+        let page = self.least.iter().enumerate().all(good).then_some(Page {
+            foliage,
+            matched,
+            finer: plan.finer,
+            charts: self.charts.clone(),
+        });
+        Ok(page)
+    }
+
+    fn cards<'s>(&'s self) -> Vec<Cards<'s>> {
+        let of = |(guest, opacity): (&Guest<'a>, &'s Vec<f32>)| {
+            let (baker, fitted) = (guest.baker, guest.fitted);
+            Cards {
+                model: &baker.tree.model,
+                groups: &fitted.plan.cards,
+                density: baker.density(fitted.request),
+                samples: baker.recipe.samples,
+                pad: baker.recipe.gutter_texels,
+                fitted: share::Fitted {
+                    foliage: &fitted.foliage,
+                    opacity,
+                },
+            }
+        };
+        self.guests.iter().zip(&self.opacity).map(of).collect()
+    }
+}
+
+/// Levels on one page, not yet complete.
+pub struct Page {
+    foliage: Foliage,
+    matched: Matched,
+    /// Texels along a line over those that levels should have.
+    finer: f32,
+    /// Which charts are whose.
+    charts: Vec<Range<usize>>,
+}
+
+impl Page {
+    /// Texels along a line over those that levels should have; 1 or less.
+    pub fn finer(&self) -> f32 {
+        self.finer
+    }
+
+    /// A level for each guest, all with the same images.
+    pub fn levels(mut self, guests: &[Guest]) -> Vec<Level> {
+        self.foliage.bleed();
+        let images = self.foliage.images();
+        let level = |(guest, charts): (&Guest, Range<usize>)| {
+            let fitted = guest.fitted;
+            let surface = self.foliage.surface(charts.clone());
+            Level {
+                scene: on_page(fitted.wood.clone(), surface, images.clone()),
+                request: fitted.request,
+                plan: fitted.plan.clone(),
+                matched: self.matched,
+                charts: self.foliage.charts[charts].to_vec(),
+                atlas: self.foliage.size,
+                density: guest.baker.density(fitted.request) * self.finer,
+                shared: Vec::new(),
+            }
+        };
+        guests.iter().zip(self.charts.clone()).map(level).collect()
+    }
 }

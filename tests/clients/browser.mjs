@@ -1,7 +1,7 @@
 // A headless Chromium without GPU or network, and a server that gives it this folder and the files to be drawn.
 import { createServer } from 'node:http';
 import { createReadStream, statSync } from 'node:fs';
-import { extname, join, normalize } from 'node:path';
+import { dirname, extname, join, normalize } from 'node:path';
 import { chromium } from 'playwright-core';
 
 const HERE = import.meta.dirname ?? new URL('.', import.meta.url).pathname;
@@ -19,13 +19,14 @@ const FLAGS = [
   '--no-first-run',
 ];
 
-/** Serves this folder at /, `files[i]` at /file/i and `folder` at /package. */
+/** Serves this folder at /, `files[i]` at /file/i, what lies beside it at /file/i/NAME, and `folder` at /package. */
 function serve(files, folder) {
   const server = createServer((request, response) => {
     const path = normalize(decodeURIComponent(new URL(request.url, 'http://localhost').pathname));
-    const numbered = path.match(/^\/file\/(\d+)$/);
+    const numbered = path.match(/^\/file\/(\d+)(?:\/([^/]+))?$/);
     const packaged = folder && path.match(/^\/package\/([^/]+)$/);
-    const file = numbered ? files[Number(numbered[1])] : packaged ? join(folder, packaged[1]) : join(HERE, path);
+    const named = numbered && files[Number(numbered[1])];
+    const file = named ? (numbered[2] ? join(dirname(named), numbered[2]) : named) : packaged ? join(folder, packaged[1]) : join(HERE, path);
     try {
       statSync(file);
     } catch {

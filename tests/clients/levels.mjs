@@ -1,15 +1,16 @@
 // What the extension MSFT_lod and its screen coverages ask for, which the official validator does not look at.
-import { reachable, sceneRoots } from './glb.mjs';
+import { reachable } from './glb.mjs';
 
 /** Everything wrong in the level chains of a file. */
 export function lodFaults(gltf) {
   const faults = [];
-  const drawn = reachable(gltf, sceneRoots(gltf));
+  // A species has a scene for each tree.
+  const drawn = reachable(gltf, (gltf.scenes ?? []).flatMap((scene) => scene.nodes ?? []));
   (gltf.nodes ?? []).forEach((node, index) => {
     const ids = node.extensions?.MSFT_lod?.ids;
     if (!ids) return;
     if (!gltf.extensionsUsed?.includes('MSFT_lod')) faults.push('MSFT_lod is not in extensionsUsed');
-    if (!drawn.has(index)) faults.push(`node ${index} has levels but is not in the scene`);
+    if (!drawn.has(index)) faults.push(`node ${index} has levels but is in no scene`);
     if (ids.length === 0) faults.push(`node ${index}: no levels`);
     if (new Set(ids).size !== ids.length) faults.push(`node ${index}: a level is listed twice`);
     for (const id of ids) {

@@ -33,7 +33,7 @@ const broken = {
   'screen coverages do not decrease': (g) => (g.nodes[0].extras.MSFT_screencoverage = [0.5, 0.5, 0]),
   'screen coverage outside 0..1': (g) => (g.nodes[0].extras.MSFT_screencoverage[0] = 2),
   'MSFT_lod is not in extensionsUsed': (g) => delete g.extensionsUsed,
-  'has levels but is not in the scene': (g) => (g.scenes[0].nodes = [1]),
+  'has levels but is in no scene': (g) => (g.scenes[0].nodes = [1]),
 };
 for (const [message, change] of Object.entries(broken)) {
   test(`found: ${message}`, () => assert.match(chain(change), new RegExp(message)));

@@ -79,7 +79,7 @@ const report = await withPage('three.html', files.map((f) => f.file), async (pag
   const about = await page.evaluate('about()');
   const levels = [];
   for (const [index, { file, heights }] of files.entries()) {
-    const job = { url: `/file/${index}`, label: basename(file), modes: ['client', options.agree && 'unlit', (index === 0 || supersampled) && 'reference'].filter(Boolean), heights, views, shown, focal };
+    const job = { url: `/file/${index}/${encodeURIComponent(basename(file))}`, label: basename(file), modes: ['client', options.agree && 'unlit', (index === 0 || supersampled) && 'reference'].filter(Boolean), heights, views, shown, focal };
     const measured = await page.evaluate((j) => window.measureFile(j), job);
     levels.push({ file, original: index === 0, ...measured });
   }

@@ -1,12 +1,16 @@
 // The official glTF validator over all files given: no error, no warning. What it can't know is checked here:
 // it looks into neither MSFT_lod nor extras, and which extensions clients lack is no fault by the specification.
 //
-//   node validate.mjs FILE.glb...
+//   node validate.mjs [--linked] FILE.glb...
+//
+// --linked: images are files beside, as those of a species are: they have to be there, and the validator reads them.
 import { readFileSync } from 'node:fs';
-import { basename } from 'node:path';
+import { basename, dirname, join } from 'node:path';
 import validator from 'gltf-validator';
 import { readGlbJson, trianglesInScene } from './glb.mjs';
 import { lodFaults } from './levels.mjs';
+
+const linked = process.argv.includes('--linked');
 
 /** Files that hold one level, for clients that know no extension at all. */
 const SINGLE_LEVEL = /_LOD\d+\.glb$/;
@@ -19,14 +23,17 @@ function portabilityFaults(gltf, file) {
     if (gltf.extensionsUsed?.includes('MSFT_lod')) faults.push('a single level refers to other levels');
   }
   const external = [...(gltf.buffers ?? []), ...(gltf.images ?? [])].filter((part) => part.uri !== undefined);
-  if (external.length) faults.push(`${external.length} buffers or images outside the file`);
+  if (external.length && !linked) faults.push(`${external.length} buffers or images outside the file`);
   if (!(trianglesInScene(gltf) > 0)) faults.push('the scene has no triangles');
   return faults;
 }
 
 /** All faults of one file, and the codes of the validator's infos. */
 async function check(file) {
-  const report = await validator.validateBytes(new Uint8Array(readFileSync(file)), { maxIssues: 0 });
+  const beside = (uri) => readFileSync(join(dirname(file), decodeURIComponent(uri)));
+  const externalResourceFunction = async (uri) => new Uint8Array(beside(uri));
+  const options = { maxIssues: 0, ...(linked && { externalResourceFunction }) };
+  const report = await validator.validateBytes(new Uint8Array(readFileSync(file)), options);
   const serious = report.issues.messages.filter((m) => m.severity < 2);
   const shown = serious.slice(0, 10).map((m) => `${m.code} at ${m.pointer}: ${m.message}`);
   if (serious.length > shown.length) shown.push(`and ${serious.length - shown.length} more`);
@@ -36,9 +43,9 @@ async function check(file) {
   return { faults: [...shown, ...lodFaults(gltf), ...portabilityFaults(gltf, file)], infos, gltf };
 }
 
-const files = process.argv.slice(2);
+const files = process.argv.slice(2).filter((argument) => argument !== '--linked');
 if (files.length === 0) {
-  console.error('usage: node validate.mjs FILE.glb...');
+  console.error('usage: node validate.mjs [--linked] FILE.glb...');
   process.exit(2);
 }
 let failed = 0;

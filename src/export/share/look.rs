@@ -2,6 +2,7 @@
 
 use glam::{Vec2, Vec3};
 
+use super::{Cards, Of};
 use crate::export::chart::{Chart, Shape};
 use crate::export::foliage::Foliage;
 use crate::space::hull;
@@ -115,11 +116,12 @@ pub struct Page {
 }
 
 impl Page {
-    /// The tiles of `kept` charts; `before` are the same cards in the fitted level.
-    pub fn new(fitted: Fitted, before: &[&Chart], kept: &[Chart], size: [u32; 2]) -> Self {
+    /// The tiles of `kept` charts, which are those of the cards `own`.
+    pub(super) fn new(trees: &[Cards], own: &[Of], kept: &[Chart], size: [u32; 2]) -> Self {
         let mut texels = vec![Seen::default(); (size[0] * size[1]) as usize];
         let mut owned = Vec::new();
-        for (before, chart) in before.iter().zip(kept) {
+        for (of, chart) in own.iter().zip(kept) {
+            let (fitted, before) = (of.fitted(trees), of.before(trees));
             for (y, &length) in (0..).zip(&chart.row_lengths()) {
                 for x in 0..length {
                     let point = chart.point(Vec2::new(x as f32 + 0.5, y as f32 + 0.5));

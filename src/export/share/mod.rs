@@ -4,7 +4,8 @@
 //! shows the piece of a tile that looks most like it (opacity and colour after the best of many
 //! moves and turns found, seen from the front or from behind), and what a texel shows is then
 //! fitted for all cards that show it. Small cards lose least: a page has many pieces of their size,
-//! and their gutters were the larger part of them.
+//! and their gutters were the larger part of them. Cards of several trees of a species share one page
+//! the same way.
 
 mod look;
 mod owner;
@@ -17,7 +18,7 @@ use rayon::prelude::*;
 use super::atlas::place;
 use super::chart::{Chart, Shape};
 use super::foliage::{CardGroup, Foliage};
-use super::project::project;
+use super::project::{Texel, project};
 use crate::botany::model::Model;
 use crate::space::hull;
 
@@ -27,27 +28,61 @@ pub use owner::owners;
 pub use sheet::sheet;
 use window::Window;
 
-/// The cards of a level and how they are drawn.
+/// The cards of a tree's level, how they are drawn, and what they look like on a page of their own.
 #[derive(Clone, Copy)]
 pub struct Cards<'a> {
     /// The tree.
     pub model: &'a Model,
     /// Its cards.
     pub groups: &'a [CardGroup],
+    /// Texels a normalised unit of this tree that the level should have.
+    pub density: f32,
     /// Sub-samples a texel along each axis.
     pub samples: u32,
     /// Gutter on each side of a chart, texels.
     pub pad: f32,
+    /// The level with texels of its own.
+    pub fitted: Fitted<'a>,
 }
 
-/// A page that is smaller than the cards need together.
+/// A card of one of the trees that share a page.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Of {
+    tree: u32,
+    card: u32,
+}
+
+impl Of {
+    fn group<'a>(self, trees: &[Cards<'a>]) -> &'a CardGroup {
+        &trees[self.tree as usize].groups[self.card as usize]
+    }
+
+    /// Its chart where it has texels of its own.
+    fn before<'a>(self, trees: &[Cards<'a>]) -> &'a Chart {
+        &trees[self.tree as usize].fitted.foliage.charts[self.card as usize]
+    }
+
+    fn fitted<'a>(self, trees: &[Cards<'a>]) -> Fitted<'a> {
+        trees[self.tree as usize].fitted
+    }
+}
+
+/// Every card of all trees, tree by tree.
+fn all_of(trees: &[Cards]) -> Vec<Of> {
+    let of_tree = |(tree, cards): (u32, &Cards)| {
+        (0..cards.groups.len() as u32).map(move |card| Of { tree, card })
+    };
+    (0..).zip(trees).flat_map(of_tree).collect()
+}
+
+/// A page that may be smaller than the cards need together.
 #[derive(Clone, Debug)]
 pub struct Plan {
     /// Width and height in texels.
     pub size: [u32; 2],
-    /// Texels a normalised unit.
-    pub density: f32,
-    /// All cards, the largest first.
+    /// Texels along a line over those that levels should have; 1 or less.
+    pub finer: f32,
+    /// All cards, the largest first, by their number in the order of [`all_of`].
     order: Vec<u32>,
     /// Charts of the first ones, placed.
     kept: Vec<Chart>,
@@ -64,36 +99,50 @@ const KEPT: f64 = 0.75;
 impl Plan {
     /// The finest texels with which most of the cards' area has tiles of its own on a page of this
     /// size; `None` where even the coarsest are too many.
-    pub fn new(cards: Cards, density: f32, size: [u32; 2]) -> Option<Self> {
-        let area = |i: u32| f64::from(cards.groups[i as usize].card.area());
-        let mut order: Vec<u32> = (0..cards.groups.len() as u32).collect();
+    pub fn new(trees: &[Cards], size: [u32; 2]) -> Option<Self> {
+        let all = all_of(trees);
+        let area = |i: u32| {
+            let of = all[i as usize];
+            let density = f64::from(trees[of.tree as usize].density);
+            f64::from(of.group(trees).card.area()) * density * density
+        };
+        let mut order: Vec<u32> = (0..all.len() as u32).collect();
         order.sort_by(|&a, &b| area(b).total_cmp(&area(a)).then(a.cmp(&b)));
-        let all: f64 = order.iter().map(|&i| area(i)).sum();
+        let whole: f64 = order.iter().map(|&i| area(i)).sum();
+        let ranked: Vec<Of> = order.iter().map(|&i| all[i as usize]).collect();
         (0..DENSITIES).find_map(|step| {
-            let density = density * (-0.25 * step as f32).exp2();
-            let kept = keep(cards, &order, density, size);
+            let finer = (-0.25 * step as f32).exp2();
+            let kept = keep(trees, &ranked, finer, size);
             let held: f64 = order[..kept.len()].iter().map(|&i| area(i)).sum();
-            (held >= KEPT * all).then(|| Self {
+            (held >= KEPT * whole).then(|| Self {
                 size,
-                density,
+                finer,
                 order: order.clone(),
                 kept,
             })
         })
     }
 
-    /// The cards on this page, as projected; `None` where a card is larger than the page.
-    pub fn share(&self, cards: Cards, fitted: Fitted) -> Option<Foliage> {
-        let before = |i: u32| &fitted.foliage.charts[i as usize];
+    /// Whether every card has a tile of its own, as fine as it should be.
+    pub fn is_complete(&self) -> bool {
+        self.finer == 1.0 && self.kept.len() == self.order.len()
+    }
+
+    /// The cards of all trees, in their order, on this page, as projected; `None` where a card is larger
+    /// than the page.
+    pub fn share(&self, trees: &[Cards]) -> Option<Foliage> {
+        let all = all_of(trees);
         let (first, rest) = self.order.split_at(self.kept.len());
-        let own: Vec<&Chart> = first.iter().map(|&i| before(i)).collect();
-        let page = Page::new(fitted, &own, &self.kept, self.size);
+        let own: Vec<Of> = first.iter().map(|&i| all[i as usize]).collect();
+        let page = Page::new(trees, &own, &self.kept, self.size);
         let copies: Option<Vec<Chart>> = rest
             .par_iter()
             .map(|&i| {
-                let look = Look::new(fitted, before(i), self.density);
+                let of = all[i as usize];
+                let density = trees[of.tree as usize].density * self.finer;
+                let look = Look::new(of.fitted(trees), of.before(trees), density);
                 let window = Window::find(&look, &page, i.into())?;
-                Some(window.chart(before(i), &look, self.density))
+                Some(window.chart(of.before(trees), &look, density))
             })
             .collect();
         let mut numbered: Vec<(u32, Chart)> = self
@@ -105,18 +154,23 @@ impl Plan {
         numbered.sort_by_key(|&(i, _)| i);
         let charts = numbered.into_iter().map(|(_, chart)| chart).collect();
         let mut foliage = Foliage::of(charts, self.size);
-        foliage.project(cards.model, cards.groups, cards.samples);
-        add_copies(&mut foliage, cards);
+        let mut start = 0;
+        for cards in trees {
+            foliage.project(start, cards.model, cards.groups, cards.samples);
+            start += cards.groups.len();
+        }
+        add_copies(&mut foliage, trees);
         foliage.threshold(0.5, 0);
         Some(foliage)
     }
 }
 
 /// Charts of as many of the largest cards as have room on the page.
-fn keep(cards: Cards, order: &[u32], density: f32, size: [u32; 2]) -> Vec<Chart> {
-    let chart = |&i: &u32| {
-        let card = &cards.groups[i as usize].card;
-        upright(Chart::new(card, density, cards.pad))
+fn keep(trees: &[Cards], order: &[Of], finer: f32, size: [u32; 2]) -> Vec<Chart> {
+    let chart = |of: &Of| {
+        let cards = &trees[of.tree as usize];
+        let card = &of.group(trees).card;
+        upright(Chart::new(card, cards.density * finer, cards.pad))
     };
     let all: Vec<Chart> = order.par_iter().map(chart).collect();
     let fit = |count: usize| {
@@ -137,44 +191,50 @@ fn keep(cards: Cards, order: &[u32], density: f32, size: [u32; 2]) -> Vec<Chart>
     best
 }
 
-/// Makes every texel's coverage the mean over all cards that show it.
-fn add_copies(foliage: &mut Foliage, cards: Cards) {
-    let all = foliage.charts.iter().zip(cards.groups);
+/// Makes every texel the mean of all cards that show it: coverage of all, colours and normals of what
+/// covers it. A texel where only copies have leaves would be black otherwise.
+fn add_copies(foliage: &mut Foliage, trees: &[Cards]) {
+    let all = foliage.charts.iter().zip(all_of(trees));
     let copies: Vec<_> = all.filter(|(c, _)| c.shape == Shape::Window).collect();
-    let drawn: Vec<Vec<(usize, f32)>> = copies
+    let width = foliage.size[0];
+    let mut drawn: Vec<(usize, Texel)> = copies
         .par_iter()
-        .map(|(chart, group)| coverage(chart, group, cards, foliage.size[0]))
+        .flat_map_iter(|&(chart, of)| {
+            drawn(chart, of.group(trees), &trees[of.tree as usize], width)
+        })
         .collect();
-    let mut sums: Vec<(f32, u32)> = foliage.texels.iter().map(|t| (t.coverage(), 1)).collect();
-    for (at, coverage) in drawn.into_iter().flatten() {
-        sums[at].0 += coverage;
-        sums[at].1 += 1;
-    }
-    for (texel, (sum, count)) in foliage.texels.iter_mut().zip(sums) {
-        if count > 1 {
-            texel.set_coverage(sum / count as f32);
+    // Those of one texel stay in the order of their cards.
+    drawn.par_sort_by_key(|&(at, _)| at);
+    for shown in drawn.chunk_by(|a, b| a.0 == b.0) {
+        let stored = &mut foliage.texels[shown[0].0];
+        let mut mass = stored.coverage();
+        let mut sums = [stored.color(), stored.normal(), stored.orm()].map(|v| v * mass);
+        for (_, texel) in shown {
+            let values = [texel.color, texel.normal, texel.orm];
+            sums = std::array::from_fn(|k| sums[k] + values[k] * texel.coverage);
+            mass += texel.coverage;
         }
+        if mass > 0.0 {
+            let [color, normal, orm] = sums.map(|sum| sum / mass);
+            stored.set_color(color);
+            stored.set_normal(normal);
+            stored.set_orm(orm);
+        }
+        stored.set_coverage(mass / (shown.len() + 1) as f32);
     }
 }
 
-/// What a copy's own leaves cover of the texels that it shows, by their index on the page.
-fn coverage(chart: &Chart, group: &CardGroup, cards: Cards, width: u32) -> Vec<(usize, f32)> {
-    let drawn = project(
-        cards.model,
-        group.triangles.iter().copied(),
-        chart,
-        cards.samples,
-    );
+/// What a copy's own leaves show on the texels that it shows, by their index on the page.
+fn drawn(chart: &Chart, group: &CardGroup, cards: &Cards, width: u32) -> Vec<(usize, Texel)> {
+    let triangles = group.triangles.iter().copied();
+    let drawn = project(cards.model, triangles, chart, cards.samples);
     let outline: Vec<Vec2> = chart.corners.iter().map(|&c| chart.texel(c)).collect();
     let [w, h] = chart.size;
     let all = (0..w * h).map(|i| (i, Vec2::new((i % w) as f32 + 0.5, (i / w) as f32 + 0.5)));
     all.filter(|&(_, texel)| hull::holds(&outline, texel, 0.0))
         .map(|(i, _)| {
             let [ax, ay] = chart.in_atlas(i % w, i / w);
-            (
-                (ay * width + ax) as usize,
-                drawn.texels[i as usize].coverage,
-            )
+            ((ay * width + ax) as usize, drawn.texels[i as usize])
         })
         .collect()
 }

@@ -1,0 +1,268 @@
+//! Several trees of one species: a package whose levels share pages.
+//!
+//! At every size at which levels start, the cards of all trees lie on one page: the largest keep tiles, and
+//! the others show pieces of them, whosever they are ([`share`](crate::export::share)). All trees are in
+//! memory together.
+
+mod files;
+mod page;
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use crate::error::{Error, Result};
+use crate::export::manifest::Manifest;
+use crate::export::package::{Package, remove_beside};
+use crate::knobs::check;
+use crate::level::{Baker, Level, LevelRequest};
+use crate::levels::{Levels, needed};
+use crate::pipeline::{cuts, original_file, pixels, read_back, settings};
+use crate::prepared::{Pieces, Prepared};
+use crate::report::judge;
+use crate::report::schema::{SharedPage, SpeciesReport, SpeciesTree};
+use crate::request::Request;
+use crate::sharing::Ruler;
+use crate::verdict::{REFUSED, in_band, refusal};
+use crate::watch::{Deadline, Watch, begin, part, step};
+use files::Files;
+pub use files::to_json;
+use page::{Candidate, Copied};
+
+/// What to bake.
+#[derive(Clone, Debug, Default)]
+pub struct Species {
+    /// The trees.
+    pub inputs: Vec<PathBuf>,
+    /// Everything else: `output` is the package's folder, whose name is the species'; `input` is filled in for
+    /// each tree.
+    pub request: Request,
+}
+
+/// What was baked.
+#[derive(Clone, Debug, Default)]
+pub struct BakedSpecies {
+    /// Figures of the written files.
+    pub report: SpeciesReport,
+    /// The package's files.
+    pub files: Vec<String>,
+    /// What was repaired, guessed or, by `accept`, tolerated; each begins with the tree.
+    pub warnings: Vec<String>,
+}
+
+/// F1 that levels may lose where the recipe says nothing of sharing.
+pub const LOSS: f64 = 0.01;
+
+/// Bakes trees of one species into a package: complete, or nothing.
+///
+/// # Errors
+/// See [`Error`]; whatever it is, the output folder is as it was.
+pub fn bake_species(species: &Species, watch: &dyn Watch) -> Result<BakedSpecies> {
+    let recipe = &species.request.recipe;
+    check(recipe)?;
+    check(&species.request.scene)?;
+    recipe.packer.check()?;
+    if recipe.instancing || recipe.hierarchy {
+        return Err(Error::usage(
+            "trees of a species share their levels' pages; instancing and hierarchy are of one tree each",
+            "leave them out of the recipe, or bake the trees without --species",
+        ));
+    }
+    let deadline = Deadline::new(watch, recipe.most_seconds);
+    let mut species = species.clone();
+    if recipe.sharing == 0.0 {
+        species.request.recipe.sharing = LOSS;
+    }
+    made(&species, &deadline).map_err(|error| deadline.explain(error))
+}
+
+fn made(species: &Species, watch: &dyn Watch) -> Result<BakedSpecies> {
+    let name = name(species)?;
+    let output = &species.request.output;
+    let package = Package::start(output, species.request.force)?;
+    let requests: Vec<Request> = species.inputs.iter().map(|i| of(species, i)).collect();
+    let prepared = requests.iter().map(|r| Prepared::new(r, watch));
+    let trees: Vec<Prepared> = prepared.collect::<Result<_>>()?;
+    let recipe = &species.request.recipe;
+    let pieces = trees.iter().map(|t| Pieces::new(&t.tree, recipe, watch));
+    let pieces: Vec<Pieces> = pieces.collect::<Result<_>>()?;
+    let bakers: Vec<Baker> = pieces.iter().map(|p| p.baker(recipe)).collect();
+    begin(watch, "describe", 1)?;
+    let all = requests.iter().zip(&trees).zip(&pieces);
+    let mut levels: Vec<Levels> = all
+        .map(|((request, t), p)| Levels::new(request, &t.tree, &p.elements, &t.ranges))
+        .collect();
+    let mut files = Files::new(&package, &name);
+    let pages = bake_pages(
+        &mut levels,
+        &trees,
+        &bakers,
+        &mut files,
+        (&species.request, watch),
+    )?;
+    let candidates = bakers.iter().zip(&trees);
+    let candidates: Vec<_> = candidates
+        .map(|(baker, t)| baker.candidates(t.tree.model.frame.radius))
+        .collect();
+    begin(watch, "write", 1)?;
+    files.write(&trees, &levels)?;
+    let mut report = SpeciesReport {
+        name: name.clone(),
+        pages,
+        ..SpeciesReport::default()
+    };
+    let mut warnings = Vec::new();
+    let mut found = Vec::new();
+    begin(watch, "measure", trees.len() as u64)?;
+    for ((t, levels), best) in trees.iter().zip(&levels).zip(candidates) {
+        let judged = read_back(&package, &levels.packed[1..], &t.rungs)?;
+        let original = (
+            &t.tree.model,
+            original_file(&levels.manifest, &t.provenance),
+        );
+        let screen = settings(&species.request.scene);
+        let mut own = judge(original, &judged, &screen, || part(watch, "view"))?;
+        own.cuts = Some(cuts(best, &levels.manifest));
+        let input = &t.tree.model.name;
+        let told = levels.manifest.tree.warnings.iter();
+        warnings.extend(told.map(|w| format!("{input}: {w}")));
+        for mut fault in in_band(&t.tree, &t.rungs, &judged, &own) {
+            fault.what = format!("{input}: {}", fault.what);
+            found.push(fault);
+        }
+        report.trees.push(SpeciesTree {
+            name: input.clone(),
+            report: own,
+        });
+        step(watch)?;
+    }
+    page::add_up(&mut report);
+    let text = files::to_json(&report)?;
+    if !found.is_empty() && !species.request.accept {
+        let beside = package.write_beside(REFUSED, text.as_bytes())?;
+        return Err(refusal(&found, &beside));
+    }
+    warnings.extend(found.into_iter().map(|f| f.what));
+    package.write("report.json", (text + "\n").as_bytes())?;
+    let mut names = files.names;
+    names.push("report.json".into());
+    names.extend(trees.iter().map(|t| files::manifest_of(&t.tree.model.name)));
+    for (t, levels) in trees.iter().zip(levels) {
+        let manifest = Manifest {
+            provenance: t.provenance.clone(),
+            files: names.clone(),
+            species: name.clone(),
+            ..levels.manifest
+        };
+        let file = files::manifest_of(&t.tree.model.name);
+        package.write(&file, manifest.to_ron()?.as_bytes())?;
+    }
+    package.commit(&names)?;
+    remove_beside(output, REFUSED);
+    Ok(BakedSpecies {
+        report,
+        files: names,
+        warnings,
+    })
+}
+
+/// The species' name: that of the package's folder.
+fn name(species: &Species) -> Result<String> {
+    let output = std::path::absolute(&species.request.output)
+        .map_err(|e| Error::io(&species.request.output, "find", e))?;
+    let name = output.file_name().unwrap_or_default().to_string_lossy();
+    let mut taken = BTreeMap::from([(name.to_lowercase(), output.clone())]);
+    for input in &species.inputs {
+        let stem = input.file_stem().unwrap_or_default().to_string_lossy();
+        // Some file systems take upper and lower case for the same.
+        if let Some(other) = taken.insert(stem.to_lowercase(), input.clone()) {
+            return Err(Error::usage(
+                format!(
+                    "{} and {} have one name, and files of the package are named after both",
+                    other.display(),
+                    input.display()
+                ),
+                "rename a tree, or give the species another folder with -o",
+            ));
+        }
+    }
+    Ok(name.into_owned())
+}
+
+fn of(species: &Species, input: &std::path::Path) -> Request {
+    Request {
+        input: input.into(),
+        ..species.request.clone()
+    }
+}
+
+/// Makes the levels of all trees, those that start at one size together.
+fn bake_pages(
+    levels: &mut [Levels],
+    trees: &[Prepared],
+    bakers: &[Baker],
+    files: &mut Files,
+    (request, watch): (&Request, &dyn Watch),
+) -> Result<Vec<SharedPage>> {
+    let (screen, max_error_px) = (&settings(&request.scene), request.max_error_px);
+    let heights = heights(trees);
+    begin(watch, "bake levels", heights.len() as u64 + 1)?;
+    let originals = levels.iter_mut().filter_map(|l| l.packed.last_mut());
+    files.images(None, originals.collect())?;
+    step(watch)?;
+    let mut pages = Vec::with_capacity(heights.len());
+    for height_px in heights {
+        let at = |t: &Prepared| t.rungs.iter().position(|r| r.height_px == height_px);
+        let mut candidates = Vec::new();
+        let mut made: Vec<(usize, Level)> = Vec::new();
+        for (i, (t, baker)) in trees.iter().zip(bakers).enumerate() {
+            let Some(rung) = at(t) else { continue };
+            let rung = needed(&t.rungs[rung], max_error_px, baker);
+            let wanted = LevelRequest::of(&rung, baker.recipe.method);
+            match baker.fitted(wanted, watch)? {
+                Some(fitted) => candidates.push(Candidate { tree: i, fitted }),
+                // The original fits into the budget.
+                None => made.push((i, baker.original_itself(wanted))),
+            }
+        }
+        let px = pixels(height_px);
+        let models = trees.iter().map(|t| &t.tree.model);
+        let rulers: Vec<Ruler> = models.map(|m| Ruler::new(m, &[px], screen)).collect();
+        let seated = page::seat(candidates, bakers, &rulers, px, watch)?;
+        let number = pages.len() + 1;
+        if let Some(sheet) = seated.sheet()? {
+            files.sheet(number, &sheet)?;
+        }
+        let copies = seated.copies();
+        let numbers: Vec<usize> = levels.iter().map(|l| l.packed.len()).collect();
+        pages.push(SharedPage {
+            page: number as u32,
+            height_px,
+            ..seated.told(trees, &numbers, &copies)
+        });
+        let page = seated.is_shared().then_some(number);
+        part(watch, "describe")?;
+        let mut here = vec![false; trees.len()];
+        for (i, level) in made.into_iter().chain(seated.levels) {
+            levels[i].add(level);
+            here[i] = true;
+        }
+        for Copied { card, of } in copies {
+            let other = (of.0 != card.0).then_some(&trees[of.0].tree.model.name);
+            levels[card.0].copy(card.1, of.1, other);
+        }
+        part(watch, "encode")?;
+        let new = levels.iter_mut().zip(here).filter(|(_, here)| *here);
+        files.images(page, new.filter_map(|(l, _)| l.packed.last_mut()).collect())?;
+        step(watch)?;
+    }
+    Ok(pages)
+}
+
+/// Sizes at which levels start, largest first, pixels.
+fn heights(trees: &[Prepared]) -> Vec<f64> {
+    let all = trees.iter().flat_map(|t| &t.rungs);
+    let mut heights: Vec<f64> = all.map(|r| r.height_px).collect();
+    heights.sort_by(|a, b| b.total_cmp(a));
+    heights.dedup();
+    heights
+}
