@@ -8,9 +8,8 @@ use super::place::{Place, Pyramid, Spheres, View};
 use super::pool::{Pool, Slot};
 use super::visibility::Visibility;
 
-/// Trees of a few species. For several threads, make one forest for each thread from a part of the
-/// trees, every second one for each of two, so that what is near is shared alike: [`Visibility`] and
-/// cuts are then its own.
+/// Trees of a few species. For several threads, make one forest for each thread from its
+/// [`shares`](super::shares()) of the trees: [`Visibility`] and cuts are then its own.
 #[derive(Clone, Debug)]
 pub struct Forest<V> {
     species: Vec<Hierarchy>,

@@ -12,9 +12,12 @@ use std::time::Instant;
 
 use glam::Vec3;
 use pleach::runtime::{
-    Cells, Density, Drawn, Forest, Hidden, Hierarchy, Law, Occlusion, Place, View,
+    Cells, Density, Drawn, Forest, Hidden, Hierarchy, Law, Occlusion, Place, View, shares,
 };
 use pleach::study::scenes::{ASPECT, CLUMPING, FOV_DEG, five_species, forest, forest_cells};
+
+/// Side of a cell of the grid in which trees hide others, metres.
+const CELL_M: f32 = 4.0;
 
 /// One core's part of the forest.
 struct Part<'g> {
@@ -76,25 +79,56 @@ fn jumps(half: f32) -> Vec<View> {
         .collect()
 }
 
-/// Nanoseconds a frame, mean and worst over frames, and what was drawn. The path is walked several
-/// times and each frame counts by its fastest time, as the floor does: other work on the machine is not ours.
-fn time(views: &[View], mut frame: impl FnMut(&View) -> usize) -> [f64; 3] {
+/// What frames took.
+#[derive(Clone)]
+struct Took {
+    /// Nanoseconds of each frame, the fastest of all rounds: other work on the machine is not ours.
+    frames: Vec<f64>,
+    /// What was drawn in a round.
+    drawn: usize,
+}
+
+impl Took {
+    fn mean(&self) -> f64 {
+        self.frames.iter().skip(1).sum::<f64>() / (self.frames.len() - 1) as f64
+    }
+
+    fn worst(&self) -> f64 {
+        self.frames.iter().skip(1).fold(0.0f64, |a, &b| a.max(b))
+    }
+}
+
+/// Walks the path several times with one core's parts and with two cores', in turns, so that what the machine does
+/// besides slows both.
+fn time(views: &[View], setups: &mut [Vec<Part>]) -> Vec<Took> {
     const ROUNDS: usize = 20;
-    let mut best = vec![f64::MAX; views.len()];
-    let mut drawn = 0;
+    let nothing = Took {
+        frames: vec![f64::MAX; views.len()],
+        drawn: 0,
+    };
+    let mut out = vec![nothing; setups.len()];
     for _ in 0..ROUNDS {
-        // Each round starts from the same cut.
-        frame(&views[views.len() - 1]);
-        drawn = 0;
-        for (view, best) in views.iter().zip(&mut best) {
-            let start = Instant::now();
-            drawn += frame(view);
-            *best = best.min(start.elapsed().as_secs_f64() * 1e9);
+        for (parts, took) in setups.iter_mut().zip(&mut out) {
+            // Each round starts from the same cut.
+            frame(parts, &views[views.len() - 1]);
+            took.drawn = 0;
+            for (view, best) in views.iter().zip(&mut took.frames) {
+                let start = Instant::now();
+                took.drawn += frame(parts, view);
+                *best = best.min(start.elapsed().as_secs_f64() * 1e9);
+            }
         }
     }
-    let worst = best.iter().skip(1).fold(0.0f64, |a, &b| a.max(b));
-    let mean = best.iter().skip(1).sum::<f64>() / (views.len() - 1) as f64;
-    [mean, worst, drawn as f64 / views.len() as f64]
+    out
+}
+
+/// A frame of all parts side by side; what is drawn.
+fn frame(parts: &mut [Part], view: &View) -> usize {
+    match &mut *parts {
+        [a, b] => drop(rayon::join(|| a.frame(view), || b.frame(view))),
+        all => all.iter_mut().for_each(|p| p.frame(view)),
+    }
+    parts.iter().map(|p| p.drawn.len()).sum()
 }
 
 /// Nanoseconds for the least that anything must do: the fastest of many rounds.
@@ -124,7 +158,7 @@ fn main() {
     };
     let hierarchies: Vec<Hierarchy> = species.iter().map(|s| s.hierarchy.clone()).collect();
     println!(
-        "{:>8}  {:<12}{:>6}{:>10}{:>12}{:>12}{:>14}{:>14}{:>14}",
+        "{:>8}  {:<12}{:>6}{:>10}{:>12}{:>12}{:>14}{:>14}{:>14}{:>12}",
         "trees",
         "path",
         "cores",
@@ -133,38 +167,38 @@ fn main() {
         "frame us",
         "ns a tree",
         "x floor",
-        "worst x floor"
+        "worst x floor",
+        "x one core"
     );
     for trees in [4992, 100_000] {
         let places = forest(&species, trees);
-        let cells = forest_cells(&species, &places, 4.0, None);
+        let cells = forest_cells(&species, &places, CELL_M, None);
         let floor = floor(&places);
         let half = 0.4 * 3.5 * (trees as f32).sqrt();
         for (name, views) in [("slow orbit", orbit()), ("jump cut", jumps(half))] {
-            for cores in [1, 2] {
-                // Every second tree for each of two: what is near, and costs most, is shared alike.
-                let part = |core: usize| -> Vec<Place> {
-                    places.iter().copied().skip(core).step_by(cores).collect()
-                };
-                let mut parts: Vec<Part> = (0..cores)
-                    .map(|core| Part::new(&hierarchies, &part(core), &cells))
-                    .collect();
-                let mut frame = |view: &View| {
-                    match &mut parts[..] {
-                        [a, b] => drop(rayon::join(|| a.frame(view), || b.frame(view))),
-                        all => all.iter_mut().for_each(|p| p.frame(view)),
-                    }
-                    parts.iter().map(|p| p.drawn.len()).sum()
-                };
-                // From a thread of the pool, as in an engine's jobs: nobody has to be woken from outside.
-                let (mean, worst, drawn) = rayon::scope(|_| time(&views, &mut frame)).into();
+            let mut setups: Vec<Vec<Part>> = [1, 2]
+                .map(|cores| {
+                    let part = |share: &Vec<u32>| {
+                        let own: Vec<Place> = share.iter().map(|&i| places[i as usize]).collect();
+                        Part::new(&hierarchies, &own, &cells)
+                    };
+                    let shares = shares(&places, cores, 4.0 * CELL_M);
+                    shares.iter().map(part).collect()
+                })
+                .into();
+            // From a thread of the pool, as in an engine's jobs: nobody has to be woken from outside.
+            let took = rayon::scope(|_| time(&views, &mut setups));
+            let one = took[0].mean();
+            for (cores, took) in (1..).zip(&took) {
                 println!(
-                    "{trees:>8}  {name:<12}{cores:>6}{drawn:>10.0}{:>12.2}{:>12.1}{:>14.1}{:>14.1}{:>14.1}",
+                    "{trees:>8}  {name:<12}{cores:>6}{:>10.0}{:>12.2}{:>12.1}{:>14.1}{:>14.1}{:>14.1}{:>12.2}",
+                    took.drawn as f64 / views.len() as f64,
                     floor / 1e3,
-                    mean / 1e3,
-                    mean / trees as f64,
-                    mean / floor,
-                    worst / floor
+                    took.mean() / 1e3,
+                    took.mean() / trees as f64,
+                    took.mean() / floor,
+                    took.worst() / floor,
+                    one / took.mean(),
                 );
             }
         }
