@@ -90,7 +90,8 @@ pub struct Recipe {
     /// Training views of the fit and of the area match, 4 to 64.
     pub training_views: u32,
     /// F1 that a level may lose where cards share texels on a page of half the size, a quarter and so on,
-    /// 0 to 0.2; default 0: every card has texels of its own.
+    /// 0 to 0.2; default 0: every card has texels of its own. Where it is more than 0, maps of light (normals;
+    /// occlusion, roughness, metalness) have half the texels of colours along a line.
     pub sharing: f64,
     /// Whether cards whose sides differ visibly get a texture for each, at twice the triangles; not with `sharing`.
     pub second_sides: bool,

@@ -89,7 +89,7 @@ impl<'a> Ruler<'a> {
         }
         let (without, bytes) = self.measure(&level, height_px)?;
         (told.f1_without, told.texture_bytes_without) = (without.mean, bytes);
-        let density = level.density;
+        let (density, atlas) = (level.density, level.atlas);
         for candidate in shared {
             let (f1, _) = self.measure(&candidate, height_px)?;
             if within(&f1, &without, most) {
@@ -99,6 +99,7 @@ impl<'a> Ruler<'a> {
         }
         let copies = level.charts.iter().filter(|c| c.shape == Shape::Window);
         told.copies = copies.count() as u64;
+        told.smaller_page = level.atlas != atlas;
         told.tiles -= told.copies;
         told.density = f64::from(level.density / density);
         let page = level.page().filter(|_| told.copies > 0);
@@ -132,7 +133,7 @@ pub fn told(report: &Report, chosen: Vec<SharedLevel>) -> Sharing {
     let with_figures = |(mut level, row): (SharedLevel, &schema::Level)| {
         level.texture_bytes_with = row.texture_bytes;
         level.f1_with = row.sizes.first().map_or(0.0, |s| s.f1.mean);
-        if level.density == 1.0 && level.copies == 0 {
+        if level.texture_bytes_without == 0 {
             level.texture_bytes_without = level.texture_bytes_with;
             level.f1_without = level.f1_with;
         }
@@ -155,12 +156,12 @@ pub fn kept(sharing: &Sharing, most: f64) -> Option<String> {
     let kept: Vec<String> = sharing
         .levels
         .iter()
-        .filter(|l| l.tiles > 0 && l.texture_bytes_with == l.texture_bytes_without)
+        .filter(|l| l.tiles > 0 && l.copies == 0 && l.density == 1.0 && !l.smaller_page)
         .map(|l| l.level.to_string())
         .collect();
     (!kept.is_empty()).then(|| {
         format!(
-            "level {} keeps its page: none of half the size was found on which it loses at most {most} of F1",
+            "level {} keeps its page, with coarser maps of light: none of half the size was found on which it loses at most {most} of F1",
             kept.join(", ")
         )
     })

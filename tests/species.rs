@@ -251,7 +251,10 @@ fn where_no_page_is_good_enough_each_level_keeps_its_own() {
     let all = baked(home.path(), 1e-9, 2);
     let folder = home.path().join("oaks");
     for page in all.report.pages.iter().filter(|p| !p.shared) {
-        assert_eq!((page.bytes_with, page.copies), (page.bytes_without, 0));
+        // Pages as they were, with maps of light of a quarter of the bytes: (1 + 1/4 + 1/4) / 3 of all, but for mips.
+        assert_eq!(page.copies, 0);
+        let share = page.bytes_with as f64 / page.bytes_without as f64;
+        assert!((share - 0.5).abs() < 1e-3, "{share}");
         assert!(page.trees.iter().all(|t| t.f1_with == t.f1_without));
         for name in NAMES {
             let file = folder.join(format!("{name}_LOD{}.glb", page.page));

@@ -3,6 +3,7 @@
 pub mod atlas;
 pub mod blocks;
 pub mod chart;
+pub mod coarser;
 pub mod combined;
 pub mod edge;
 pub mod enough;

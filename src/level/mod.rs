@@ -23,6 +23,7 @@ use crate::detail::whole_tree::{crossed_quads, level_cards, whole_tree};
 use crate::detail::wood::{Wood, WoodOption};
 use crate::error::Result;
 use crate::export::chart::Chart;
+use crate::export::coarser::{halved, halved_normals};
 use crate::export::foliage::IMAGES;
 use crate::export::matching::Matched;
 use crate::export::original::Original;
@@ -121,6 +122,17 @@ impl Level {
     pub fn back_of(&self, card: u32) -> Option<&Chart> {
         let nth = self.plan.sided.iter().position(|&sided| sided == card)?;
         self.charts.get(self.plan.cards.len() + nth)
+    }
+
+    /// The same with maps of light of half the resolution: see [`coarser`](crate::export::coarser).
+    pub fn with_coarser_maps(mut self) -> Self {
+        let maps = self.plan.cards.len().min(1) * (IMAGES.len() - 1);
+        let first = self.scene.images.len() - maps;
+        if let [normals, others] = &mut self.scene.images[first..] {
+            *normals = halved_normals(normals);
+            *others = halved(others);
+        }
+        self
     }
 
     /// The page of its cards: base colour with alpha.

@@ -6,6 +6,7 @@ use super::fit::{Fitted, on_page};
 use super::{Baker, Level};
 use crate::error::Result;
 use crate::export::atlas::MAX_SIDE;
+use crate::export::coarser::{halved, halved_normals};
 use crate::export::foliage::Foliage;
 use crate::export::level_scene::AreaGoal;
 use crate::export::matching::{CONTRAST_GUESS, Matched, Standing, match_area};
@@ -18,13 +19,14 @@ use crate::watch::{Watch, part};
 const PASSES: f64 = 6.0;
 
 impl Baker<'_> {
-    /// A level with all that shares its texels.
+    /// A level with all that shares its texels, and at last what only has coarser maps of light.
     pub(super) fn finished(&self, fitted: Fitted, watch: &dyn Watch) -> Result<Level> {
-        let shared = self.shared(&fitted, watch)?;
-        Ok(Level {
-            shared,
-            ..fitted.level(self.original.height)
-        })
+        let mut shared = self.shared(&fitted, watch)?;
+        let level = fitted.level(self.original.height);
+        if self.recipe.sharing > 0.0 && !level.charts.is_empty() {
+            shared.push(level.clone().with_coarser_maps());
+        }
+        Ok(Level { shared, ..level })
     }
 
     /// The level on pages of half the size, a quarter and so on, the smallest first, while it may lose no
@@ -206,10 +208,11 @@ impl Page {
         self.finer
     }
 
-    /// A level for each guest, all with the same images.
+    /// A level for each guest, all with the same images: maps of light are of half the resolution.
     pub fn levels(mut self, guests: &[Guest]) -> Vec<Level> {
         self.foliage.bleed();
-        let images = self.foliage.images();
+        let [color, normals, others] = self.foliage.images();
+        let images = [color, halved_normals(&normals), halved(&others)];
         let level = |(guest, charts): (&Guest, Range<usize>)| {
             let fitted = guest.fitted;
             let surface = self.foliage.surface(charts.clone());

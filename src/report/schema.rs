@@ -259,6 +259,9 @@ pub struct SharedLevel {
     pub copies: u64,
     /// Texels along a line over those that the level has without sharing; 1 where nothing is shared.
     pub density: f64,
+    /// Whether its page is smaller than without sharing; otherwise only its maps of light are.
+    #[serde(default)]
+    pub smaller_page: bool,
     /// Bytes of all its textures with sharing.
     pub texture_bytes_with: u64,
     /// Bytes without.

@@ -18,8 +18,9 @@ use crate::level::{Baker, Level, LevelRequest};
 use crate::levels::{Levels, needed};
 use crate::pipeline::{cuts, original_file, pixels, read_back, settings};
 use crate::prepared::{Pieces, Prepared};
-use crate::report::judge;
+use crate::report::band::Fault;
 use crate::report::schema::{SharedPage, SpeciesReport, SpeciesTree};
+use crate::report::{Cuts, judge};
 use crate::request::Request;
 use crate::sharing::Ruler;
 use crate::verdict::{REFUSED, in_band, refusal};
@@ -114,25 +115,12 @@ fn made(species: &Species, watch: &dyn Watch) -> Result<BakedSpecies> {
     let mut found = Vec::new();
     begin(watch, "measure", trees.len() as u64)?;
     for ((t, levels), best) in trees.iter().zip(&levels).zip(candidates) {
-        let judged = read_back(&package, &levels.packed[1..], &t.rungs)?;
-        let original = (
-            &t.tree.model,
-            original_file(&levels.manifest, &t.provenance),
-        );
-        let screen = settings(&species.request.scene);
-        let mut own = judge(original, &judged, &screen, || part(watch, "view"))?;
-        own.cuts = Some(cuts(best, &levels.manifest));
-        let input = &t.tree.model.name;
+        let own = cuts(best, &levels.manifest);
+        let (measured, faults) = measure(&package, t, levels, own, watch)?;
         let told = levels.manifest.tree.warnings.iter();
-        warnings.extend(told.map(|w| format!("{input}: {w}")));
-        for mut fault in in_band(&t.tree, &t.rungs, &judged, &own) {
-            fault.what = format!("{input}: {}", fault.what);
-            found.push(fault);
-        }
-        report.trees.push(SpeciesTree {
-            name: input.clone(),
-            report: own,
-        });
+        warnings.extend(told.map(|w| format!("{}: {w}", measured.name)));
+        report.trees.push(measured);
+        found.extend(faults);
         step(watch)?;
     }
     page::add_up(&mut report);
@@ -163,6 +151,31 @@ fn made(species: &Species, watch: &dyn Watch) -> Result<BakedSpecies> {
         files: names,
         warnings,
     })
+}
+
+/// Reads a tree's levels back and measures them; what left its band is named after the tree.
+fn measure(
+    package: &Package,
+    t: &Prepared,
+    levels: &Levels,
+    cuts: Cuts,
+    watch: &dyn Watch,
+) -> Result<(SpeciesTree, Vec<Fault>)> {
+    let name = &t.tree.model.name;
+    let judged = read_back(package, &levels.packed[1..], &t.rungs)?;
+    let original = (
+        &t.tree.model,
+        original_file(&levels.manifest, &t.provenance),
+    );
+    let screen = settings(&levels.manifest.scene);
+    let mut report = judge(original, &judged, &screen, || part(watch, "view"))?;
+    report.cuts = Some(cuts);
+    let mut faults = in_band(&t.tree, &t.rungs, &judged, &report);
+    for fault in &mut faults {
+        fault.what = format!("{name}: {}", fault.what);
+    }
+    let name = name.clone();
+    Ok((SpeciesTree { name, report }, faults))
 }
 
 /// The species' name: that of the package's folder.

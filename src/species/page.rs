@@ -95,7 +95,8 @@ pub fn seat(
         }
     }
     if !seated.shared {
-        seated.levels = candidates.iter().map(|c| (c.tree, alone(c))).collect();
+        let coarser = |c: &Candidate| (c.tree, alone(c).with_coarser_maps());
+        seated.levels = candidates.iter().map(coarser).collect();
     }
     Ok(seated)
 }
@@ -168,8 +169,12 @@ impl Seated {
             copies: copies.len() as u64,
             copies_of_others: copies.iter().filter(|c| c.card.0 != c.of.0).count() as u64,
             bytes_with: match self.shared {
-                true => page_bytes(size),
-                false => self.bytes_without,
+                true => bytes_with_coarser_maps(size),
+                false => self
+                    .levels
+                    .iter()
+                    .map(|(_, l)| bytes_with_coarser_maps(l.atlas))
+                    .sum(),
             },
             bytes_without: self.bytes_without,
             trees: self.levels.iter().zip(&self.f1).map(tree).collect(),
@@ -178,14 +183,24 @@ impl Seated {
     }
 }
 
-/// Bytes of the three images of a page as a GPU holds them, uncompressed with all mips.
-fn page_bytes([mut w, mut h]: [u32; 2]) -> u64 {
+/// Bytes of an image as a GPU holds it, uncompressed with all mips.
+fn image_bytes([mut w, mut h]: [u32; 2]) -> u64 {
     let mut texels = u64::from(w) * u64::from(h);
     while w > 1 || h > 1 {
         (w, h) = ((w / 2).max(1), (h / 2).max(1));
         texels += u64::from(w) * u64::from(h);
     }
-    3 * 4 * texels
+    4 * texels
+}
+
+/// Bytes of the three images of a page.
+fn page_bytes(size: [u32; 2]) -> u64 {
+    3 * image_bytes(size)
+}
+
+/// Bytes of a page whose maps of light are of half the resolution.
+fn bytes_with_coarser_maps(size: [u32; 2]) -> u64 {
+    image_bytes(size) + 2 * image_bytes(size.map(|side| (side / 2).max(1)))
 }
 
 /// Adds up the pages.
@@ -205,5 +220,9 @@ mod tests {
         // 4 x 2, 2 x 1, 1 x 1.
         assert_eq!(page_bytes([4, 2]), 12 * (8 + 2 + 1));
         assert_eq!(page_bytes([0, 0]), 0);
+        assert_eq!(
+            bytes_with_coarser_maps([4, 2]),
+            4 * (8 + 2 + 1) + 2 * 4 * (2 + 1)
+        );
     }
 }
