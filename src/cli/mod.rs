@@ -1,6 +1,7 @@
 //! The command line: one file a command.
 
 mod bake;
+mod bake_table;
 mod batch;
 mod evaluate;
 mod evaluate_folder;

@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use super::bake::{head, line};
+use super::bake_table::{head, line};
 use super::out::{print, say};
 use super::progress::Bars;
 use crate::error::Result;

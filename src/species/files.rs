@@ -11,10 +11,9 @@ use crate::export::manifest::SUFFIX;
 use crate::export::package::Package;
 use crate::export::png::encode_png;
 use crate::levels::Levels;
+use crate::prepared::Prepared;
 use crate::report::schema::SpeciesReport;
 use crate::space::sha256::sha256;
-
-use super::Prepared;
 
 /// What was written so far.
 pub struct Files<'a> {

@@ -1,11 +1,11 @@
 //! One page for the levels of several trees that start at one size.
 
-use super::Prepared;
 use crate::error::Result;
 use crate::export::chart::{Chart, Shape};
 use crate::export::png::encode_png;
 use crate::export::share::{owners, sheet};
 use crate::level::{Baker, Fitted, Guest, Level, Table, half};
+use crate::prepared::Prepared;
 use crate::report::schema::{Figure, SharedPage, SharedTree, SpeciesReport};
 use crate::sharing::{Ruler, within};
 use crate::watch::{Watch, part};

@@ -7,6 +7,8 @@
 //! and their gutters were the larger part of them. Cards of several trees of a species share one page
 //! the same way.
 
+mod cards;
+mod fitted;
 mod look;
 mod owner;
 mod sheet;
@@ -19,61 +21,15 @@ use super::atlas::place;
 use super::chart::{Chart, Shape};
 use super::foliage::{CardGroup, Foliage};
 use super::project::{Texel, project};
-use crate::botany::model::Model;
 use crate::space::hull;
 
-pub use look::Fitted;
+pub use cards::Cards;
+use cards::{Of, all_of};
+pub use fitted::Fitted;
 use look::{Look, Page, upright};
 pub use owner::owners;
 pub use sheet::sheet;
 use window::Window;
-
-/// The cards of a tree's level, how they are drawn, and what they look like on a page of their own.
-#[derive(Clone, Copy)]
-pub struct Cards<'a> {
-    /// The tree.
-    pub model: &'a Model,
-    /// Its cards.
-    pub groups: &'a [CardGroup],
-    /// Texels a normalised unit of this tree that the level should have.
-    pub density: f32,
-    /// Sub-samples a texel along each axis.
-    pub samples: u32,
-    /// Gutter on each side of a chart, texels.
-    pub pad: f32,
-    /// The level with texels of its own.
-    pub fitted: Fitted<'a>,
-}
-
-/// A card of one of the trees that share a page.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Of {
-    tree: u32,
-    card: u32,
-}
-
-impl Of {
-    fn group<'a>(self, trees: &[Cards<'a>]) -> &'a CardGroup {
-        &trees[self.tree as usize].groups[self.card as usize]
-    }
-
-    /// Its chart where it has texels of its own.
-    fn before<'a>(self, trees: &[Cards<'a>]) -> &'a Chart {
-        &trees[self.tree as usize].fitted.foliage.charts[self.card as usize]
-    }
-
-    fn fitted<'a>(self, trees: &[Cards<'a>]) -> Fitted<'a> {
-        trees[self.tree as usize].fitted
-    }
-}
-
-/// Every card of all trees, tree by tree.
-fn all_of(trees: &[Cards]) -> Vec<Of> {
-    let of_tree = |(tree, cards): (u32, &Cards)| {
-        (0..cards.groups.len() as u32).map(move |card| Of { tree, card })
-    };
-    (0..).zip(trees).flat_map(of_tree).collect()
-}
 
 /// A page that may be smaller than the cards need together.
 #[derive(Clone, Debug)]

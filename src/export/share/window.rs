@@ -168,7 +168,7 @@ impl Window {
 mod tests {
     use glam::Vec3;
 
-    use super::super::look::Seen;
+    use super::super::fitted::Seen;
     use super::*;
 
     const SIDE: u32 = 64;
