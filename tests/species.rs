@@ -175,7 +175,7 @@ fn manifests_say_whose_texels_a_copy_shows() {
             }
         }
     }
-    let told = |of: fn(&pleach::report::schema::SharedPage) -> u64| -> u64 {
+    let told = |of: fn(&pleach::report::species::SharedPage) -> u64| -> u64 {
         all.report.pages.iter().map(of).sum()
     };
     assert_eq!(
@@ -262,7 +262,7 @@ fn where_no_page_is_good_enough_each_level_keeps_its_own() {
         }
     }
     for page in &all.report.pages {
-        let lost = |t: &pleach::report::schema::SharedTree| t.f1_without - t.f1_with;
+        let lost = |t: &pleach::report::species::SharedTree| t.f1_without - t.f1_with;
         assert!(page.trees.iter().all(|t| lost(t) <= 1e-9), "{page:?}");
     }
 }

@@ -6,7 +6,7 @@ use super::bake_table::{head, line};
 use super::out::{print, say};
 use super::progress::Bars;
 use crate::error::Result;
-use crate::report::schema::SpeciesReport;
+use crate::report::species::SpeciesReport;
 use crate::species::{BakedSpecies, Species, bake_species, to_json};
 use crate::threads::pool;
 

@@ -18,6 +18,7 @@ mod reference;
 pub mod schema;
 mod shot;
 mod silhouette;
+pub mod species;
 mod stage;
 mod stand;
 mod start;

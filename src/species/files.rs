@@ -12,7 +12,7 @@ use crate::export::package::Package;
 use crate::export::png::encode_png;
 use crate::levels::Levels;
 use crate::prepared::Prepared;
-use crate::report::schema::SpeciesReport;
+use crate::report::species::SpeciesReport;
 use crate::space::sha256::sha256;
 
 /// What was written so far.

@@ -19,7 +19,7 @@ use crate::levels::{Levels, needed};
 use crate::pipeline::{cuts, original_file, pixels, read_back, settings};
 use crate::prepared::{Pieces, Prepared};
 use crate::report::band::Fault;
-use crate::report::schema::{SharedPage, SpeciesReport, SpeciesTree};
+use crate::report::species::{SharedPage, SpeciesReport, SpeciesTree};
 use crate::report::{Cuts, judge};
 use crate::request::Request;
 use crate::sharing::Ruler;

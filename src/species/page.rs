@@ -6,7 +6,8 @@ use crate::export::png::encode_png;
 use crate::export::share::{owners, sheet};
 use crate::level::{Baker, Fitted, Guest, Level, Table, half};
 use crate::prepared::Prepared;
-use crate::report::schema::{Figure, SharedPage, SharedTree, SpeciesReport};
+use crate::report::schema::Figure;
+use crate::report::species::{SharedPage, SharedTree, SpeciesReport};
 use crate::sharing::{Ruler, within};
 use crate::watch::{Watch, part};
 
