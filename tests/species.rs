@@ -20,6 +20,9 @@ use tempfile::TempDir;
 
 const MOST: f64 = 0.02;
 
+/// A name that a URI has to say in other letters.
+const SPECIES: &str = "our oaks 50%41 #1";
+
 const NAMES: [&str; 3] = ["ash", "elm", "lime"];
 
 /// Three oaks of different seeds and sizes in `folder`.
@@ -60,7 +63,7 @@ fn request(output: PathBuf, sharing: f64) -> Request {
 fn baked(folder: &Path, sharing: f64, threads: usize) -> BakedSpecies {
     let species = Species {
         inputs: trees(folder),
-        request: request(folder.join("oaks"), sharing),
+        request: request(folder.join(SPECIES), sharing),
     };
     let pool = pool(threads).unwrap();
     pool.install(|| bake_species(&species, &Unwatched)).unwrap()
@@ -90,7 +93,7 @@ fn page_of(file: &Path) -> BTreeSet<String> {
 #[test]
 fn levels_of_all_trees_show_one_page_and_are_nearly_as_good_as_alone() {
     let (home, all) = &*BAKED;
-    let folder = home.path().join("oaks");
+    let folder = home.path().join(SPECIES);
     assert_eq!(all.report.trees.len(), 3);
     assert_eq!(all.report.pages.len(), 2);
     for (level, page) in (1..).zip(&all.report.pages) {
@@ -147,13 +150,13 @@ fn manifests(folder: &Path) -> impl Iterator<Item = Manifest> {
 #[test]
 fn manifests_say_whose_texels_a_copy_shows() {
     let (home, all) = &*BAKED;
-    let folder = home.path().join("oaks");
+    let folder = home.path().join(SPECIES);
     let manifests: Vec<Manifest> = manifests(&folder).collect();
     let (mut copies, mut others, mut on_tiles) = (0, 0, 0);
     for (own, manifest) in manifests.iter().enumerate() {
         assert_eq!(
             (manifest.species.as_str(), &manifest.files),
-            ("oaks", &all.files)
+            (SPECIES, &all.files)
         );
         for (k, level) in manifest.levels.iter().enumerate() {
             for card in &level.cards {
@@ -190,8 +193,8 @@ fn manifests_say_whose_texels_a_copy_shows() {
 #[test]
 fn one_file_holds_all_trees_a_scene_each_and_every_image_is_written_once() {
     let (home, all) = &*BAKED;
-    let folder = home.path().join("oaks");
-    let combined = json(&folder.join("oaks.glb"));
+    let folder = home.path().join(SPECIES);
+    let combined = json(&folder.join(format!("{SPECIES}.glb")));
     let scenes = combined["scenes"].as_array().unwrap();
     let named: Vec<&str> = scenes.iter().map(|s| s["name"].as_str().unwrap()).collect();
     assert_eq!(named, NAMES);
@@ -234,7 +237,7 @@ fn black(image: &Image) -> f64 {
 fn texels_that_only_copies_cover_have_a_colour() {
     let (home, _) = &*BAKED;
     for name in NAMES {
-        let model = load(&home.path().join(format!("oaks/{name}_LOD1.glb"))).unwrap();
+        let model = load(&home.path().join(format!("{SPECIES}/{name}_LOD1.glb"))).unwrap();
         let foliage = model
             .materials
             .iter()
@@ -249,7 +252,7 @@ fn texels_that_only_copies_cover_have_a_colour() {
 fn where_no_page_is_good_enough_each_level_keeps_its_own() {
     let home = tempfile::tempdir().unwrap();
     let all = baked(home.path(), 1e-9, 2);
-    let folder = home.path().join("oaks");
+    let folder = home.path().join(SPECIES);
     for page in all.report.pages.iter().filter(|p| !p.shared) {
         // Pages as they were, with maps of light of a quarter of the bytes: (1 + 1/4 + 1/4) / 3 of all, but for mips.
         assert_eq!(page.copies, 0);
@@ -274,7 +277,7 @@ fn the_same_bytes_on_one_thread_and_on_two() {
     let with_one = baked(home.path(), MOST, 1);
     assert_eq!(with_one.files, with_two.files);
     for file in &with_one.files {
-        let read = |home: &Path| std::fs::read(home.join("oaks").join(file)).unwrap();
+        let read = |home: &Path| std::fs::read(home.join(SPECIES).join(file)).unwrap();
         assert!(read(home.path()) == read(two.path()), "{file}");
     }
 }

@@ -17,8 +17,7 @@ pub fn halved(image: &Image) -> Image {
         let sum = texels.iter().fold([0u32; 4], |sum, t| {
             std::array::from_fn(|k| sum[k] + u32::from(t[k]))
         });
-        let count = texels.len() as u32;
-        sum.map(|s| ((s + count / 2) / count) as u8)
+        sum.map(|s| ((s + 2) / 4) as u8)
     })
 }
 
@@ -29,7 +28,7 @@ pub fn halved_normals(image: &Image) -> Image {
             |t: &[u8; 4]| Vec3::from([t[0], t[1], t[2]].map(|c| f32::from(c) / 127.5 - 1.0));
         let sum: Vec3 = texels.iter().map(normal).sum();
         // What is left where they cancel is rounding: the card's own normal.
-        let direction = match sum.length() < 0.1 * texels.len() as f32 {
+        let direction = match sum.length() < 0.4 {
             true => Vec3::Z,
             false => sum.normalize(),
         };
@@ -40,10 +39,11 @@ pub fn halved_normals(image: &Image) -> Image {
 }
 
 /// An image of half the width and height whose texels `of` makes of those that lie there.
-fn mean(image: &Image, of: impl Fn(&[[u8; 4]]) -> [u8; 4] + Sync) -> Image {
+fn mean(image: &Image, of: impl Fn([[u8; 4]; 4]) -> [u8; 4] + Sync) -> Image {
     let [width, height] = [image.width, image.height].map(|side| (side / 2).max(1));
-    let across = |x: u32, side: u32| if side == 1 { 0..1 } else { 2 * x..2 * x + 2 };
-    let texel = &|x: u32, y: u32| {
+    // A side of one texel: the same texel twice.
+    let texel = |x: u32, y: u32| {
+        let [x, y] = [x.min(image.width - 1), y.min(image.height - 1)];
         let at = (y * image.width + x) as usize * 4;
         [0, 1, 2, 3].map(|k| image.rgba[at + k])
     };
@@ -51,11 +51,9 @@ fn mean(image: &Image, of: impl Fn(&[[u8; 4]]) -> [u8; 4] + Sync) -> Image {
     let rows = rgba.par_chunks_mut(4 * width as usize);
     (0..height).into_par_iter().zip(rows).for_each(|(y, row)| {
         for (x, out) in (0..).zip(row.chunks_mut(4)) {
-            let rows = across(y, image.height);
-            let texels: Vec<[u8; 4]> = rows
-                .flat_map(|v| across(x, image.width).map(move |u| texel(u, v)))
-                .collect();
-            out.copy_from_slice(&of(&texels));
+            let (u, v) = (2 * x, 2 * y);
+            let [left, right] = [u, u + 1].map(|u| [texel(u, v), texel(u, v + 1)]);
+            out.copy_from_slice(&of([left[0], right[0], left[1], right[1]]));
         }
     });
     Image {

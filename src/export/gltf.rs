@@ -4,6 +4,7 @@
 //! shows right. The root node holds the similarity from normalised space back to the world.
 
 use glam::Vec3;
+use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, utf8_percent_encode};
 use serde_json::{Map, Value, json};
 
 use super::surface::{Scene, Surface, textures_of};
@@ -183,7 +184,7 @@ impl FileBuilder {
         if let Some(index) = self.digests.iter().position(|d| d == uri) {
             return index;
         }
-        let mut entry = json!({ "uri": uri });
+        let mut entry = json!({ "uri": reference(uri) });
         if !name.is_empty() {
             entry["name"] = json!(name);
         }
@@ -369,6 +370,16 @@ impl FileBuilder {
         }
         out
     }
+}
+
+/// A file's name as a URI says it: letters that mean something there, and those that ASCII lacks, encoded.
+pub fn reference(file: &str) -> String {
+    const TOLD: AsciiSet = NON_ALPHANUMERIC
+        .remove(b'-')
+        .remove(b'_')
+        .remove(b'.')
+        .remove(b'~');
+    utf8_percent_encode(file, &TOLD).to_string()
 }
 
 /// The surface's tangents; made where a normal map needs them and the source has none, because

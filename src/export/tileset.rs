@@ -7,6 +7,7 @@
 
 use serde_json::{Value, json};
 
+use super::gltf::reference;
 use super::manifest_tiles::Tile;
 
 /// Pixels of error that Cesium and 3d-tiles-renderer allow by default.
@@ -45,7 +46,7 @@ fn tile(tiles: &[Tile], focal_px: f64, index: u32) -> Value {
     let children = tile_at.children.iter();
     let mut below: Vec<Value> = children.map(|&c| tile(tiles, focal_px, c)).collect();
     let volume = volume(tile_at);
-    let content = |file: &str| json!({ "uri": file });
+    let content = |file: &str| json!({ "uri": reference(file) });
     let mut out = json!({ "boundingVolume": volume, "geometricError": error(tile_at, focal_px) });
     match (&tile_at.billboards, &tile_at.geometry) {
         (Some(billboards), geometry) => {
