@@ -1,10 +1,9 @@
 //! Which samples a scene hits: alpha without colour or depth, the fast path.
 
-use super::pane::Pane;
-use super::row::is_all;
+use super::bits::BitTiles;
+use super::edges::{Edges, Reached, TILE, each_tile};
 use super::seen::{Seen, hitting};
-use super::tiles::Tiles;
-use super::triangle::{CENTER, Plane};
+use super::triangle::CENTER;
 use super::{Camera, Mips, Sampling, Scene};
 
 /// For every sample, whether anything hits it.
@@ -78,11 +77,13 @@ impl Mask {
         let sampling = Sampling { side, mips };
         let corners = camera.project(scene.geometry.positions, side);
         let size = [self.width * side, self.height * side].map(|s| s as i32);
-        let (whole, hits) = (Pane::of(size), &mut self.samples);
-        let mut tiles = Tiles::new(&whole);
+        let mut picture = BitTiles::new(&self.samples, size);
         let all = hitting(scene, &corners, CENTER);
-        all.map(|shown| hit::<COUNTED>(&shown, scene, sampling, &whole, &mut tiles, hits))
-            .sum()
+        let fragments = all
+            .map(|shown| hit::<COUNTED>(&shown, scene, sampling, &mut picture))
+            .sum();
+        picture.write(&mut self.samples);
+        fragments
     }
 
     /// Averages the samples of every pixel.
@@ -164,45 +165,35 @@ fn hit<const COUNTED: bool>(
     shown: &Seen,
     scene: &Scene,
     sampling: Sampling,
-    whole: &Pane,
-    tiles: &mut Tiles,
-    hits: &mut [u8],
+    picture: &mut BitTiles,
 ) -> u64 {
-    // Whatever is there hides all the rest.
-    let least = |samples: &[u8]| match is_all::<1>(samples) {
-        true => f32::INFINITY,
-        false => f32::NEG_INFINITY,
+    let Some(reached) = shown.triangle.reach(&picture.whole()) else {
+        return 0;
     };
     let mut fragments = 0;
-    let mut fragment = None;
-    let mut draw = |part: &Pane, hits: &mut [u8]| {
-        shown.triangle.rows(part, CENTER, |y, row| {
-            let column = |x: i32| whole.row(y) + x as usize;
-            let [from, to] = row.reach().map(column);
-            // Inside a crown most samples are hit: edges are not even looked at.
-            if !COUNTED && is_all::<1>(&hits[from..to]) {
-                return;
-            }
-            let [(from, to)] = row.spans();
-            if from >= to {
-                return;
-            }
-            fragments += (to - from) as u64;
-            let row = &mut hits[column(from)..column(to)];
-            if shown.material.cutoff.is_none() {
-                return row.fill(1);
-            }
-            let fragment = fragment.get_or_insert_with(|| shown.fragment(scene, sampling));
-            fragment.test_row(y, from, row);
-        });
-    };
-    if COUNTED {
-        draw(whole, hits);
-    } else {
-        // What lies in full tiles alone is not even scanned.
-        let flat = (0.0, Plane::default);
-        tiles.visible(&shown.triangle, whole, flat, hits, least, draw);
-    }
+    let (mut edges, mut fragment) = (None, None);
+    each_tile(reached, TILE, |Reached { tile, ys, .. }| {
+        let outside = if COUNTED { picture.outside(tile) } else { 0 };
+        let hits = picture.at(tile);
+        // Inside a crown most tiles are full: edges are not even looked at.
+        if !COUNTED && *hits == !0 {
+            return;
+        }
+        let first = tile.map(|t| t * TILE);
+        let edges = edges.get_or_insert_with(|| Edges::new(&shown.triangle, CENTER));
+        let inside = edges.samples(first, ys);
+        fragments += u64::from((inside & !outside).count_ones());
+        let open = inside & !*hits;
+        if open == 0 {
+            return;
+        }
+        *hits |= match shown.material.cutoff {
+            None => open,
+            Some(_) => fragment
+                .get_or_insert_with(|| shown.fragment(scene, sampling))
+                .test_tile(first, open),
+        };
+    });
     fragments
 }
 

@@ -8,10 +8,11 @@
 //! Who knows about where the threshold is asks for a range: pixels above it are as good as opaque,
 //! texels below it as good as holes, and most fragments are passed over.
 
-use super::pane::Pane;
-use super::row::TexelRow;
+use super::bits::BitTiles;
+use super::edges::{Edges, Reached, TILE, each_tile};
+use super::patch::Patch;
 use super::seen::hitting;
-use super::texture::{BLOCK, Level};
+use super::texture::BLOCK;
 use super::triangle::CENTER;
 use super::{Camera, Mask, Mips, Sampling, Scene};
 
@@ -58,43 +59,42 @@ const SAMPLING: Sampling = Sampling {
 pub fn critical(scene: &Scene, camera: &Camera, covered: &Mask, scores: Scores) -> Critical {
     let [floor, ceiling] = scores.range;
     let corners = camera.project(scene.geometry.positions, SAMPLING.side);
-    let (width, height) = (camera.width as i32, camera.height as i32);
-    let of_mask = |&hit: &u8| match hit {
-        0 => f32::NEG_INFINITY,
-        _ => f32::INFINITY,
-    };
-    let mut pixels: Vec<f32> = covered.samples.iter().map(of_mask).collect();
-    pixels.resize(width as usize * height as usize, f32::NEG_INFINITY);
-    let whole = Pane::of([width, height]);
+    let size = [camera.width, camera.height].map(|s| s as i32);
+    // Pixels above the range, whatever else covers them.
+    let mut settled = BitTiles::new(&covered.samples, size);
+    let mut pixels = vec![[f32::NEG_INFINITY; 64]; settled.count()];
     for shown in hitting(scene, &corners, CENTER) {
-        let mut fragment = None;
-        shown.triangle.rows(&whole, CENTER, |y, row| {
-            let first = y as usize * width as usize;
-            let [from, to] = row.reach().map(|x| first + x as usize);
+        let Some(reached) = shown.triangle.reach(&settled.whole()) else {
+            continue;
+        };
+        let (mut edges, mut fragment) = (None, None);
+        each_tile(reached, TILE, |Reached { tile, ys, .. }| {
+            let number = settled.number(tile);
+            let settled = settled.at(tile);
             // Inside a crown most pixels are settled: edges are not even looked at.
-            if pixels[from..to].iter().all(|&p| p >= ceiling) {
+            if *settled == !0 {
                 return;
             }
-            let [(from, to)] = row.spans();
-            if from >= to {
+            let first = tile.map(|t| t * TILE);
+            let edges = edges.get_or_insert_with(|| Edges::new(&shown.triangle, CENTER));
+            let open = edges.samples(first, ys) & !*settled;
+            if open == 0 {
                 return;
             }
-            let row = &mut pixels[first + from as usize..first + to as usize];
             if shown.material.cutoff.is_none() {
-                return row.fill(f32::INFINITY);
+                *settled |= open;
+                return;
             }
             let fragment = fragment.get_or_insert_with(|| shown.fragment(scene, SAMPLING));
-            if let Some(texels) = fragment.base_row(y) {
-                scores.raise(&texels, from, row);
+            if let Some(patch) = fragment.patch(first) {
+                *settled |= scores.raise(&patch, open, &mut pixels[number]);
             }
         });
     }
-    let above = pixels.iter().filter(|&&p| p >= ceiling).count();
-    pixels.retain(|&p| p > floor && p < ceiling);
-    pixels.shrink_to_fit();
+    let within = pixels.into_iter().flatten();
     Critical {
-        above,
-        within: pixels,
+        above: settled.hits() as usize,
+        within: within.filter(|&p| p > floor && p < ceiling).collect(),
     }
 }
 
@@ -144,35 +144,23 @@ impl ScorePage {
 }
 
 impl Scores<'_> {
-    /// Raises the pixels of a row to the highest threshold at which these texels cover them.
+    /// Raises the `open` pixels of a tile to the highest threshold at which these texels cover them;
+    /// gives back those that are above the range now.
     #[inline]
-    fn raise(&self, texels: &TexelRow, from: i32, pixels: &mut [f32]) {
-        let level: &Level = texels.level;
+    fn raise(&self, patch: &Patch, open: u64, pixels: &mut [f32; 64]) -> u64 {
         let [floor, ceiling] = self.range;
-        let step = texels.step();
-        let mut i = 0;
-        while i < pixels.len() {
-            if pixels[i] >= ceiling {
-                i += 1;
-                continue;
+        let mut above = 0;
+        patch.each(open, |sample, texel, part| {
+            let pixel = &mut pixels[sample as usize];
+            let known = pixel.max(floor);
+            if patch.level.holds(texel) && self.page.highest(texel) <= known {
+                return;
             }
-            let (texel, part) = texels.place(from + i as i32);
-            if level.holds(texel) {
-                let highest = self.page.highest(texel);
-                if highest <= floor {
-                    i += texels.run(texel, part, step).min(pixels.len() - i);
-                    continue;
-                }
-                if highest <= pixels[i] {
-                    i += 1;
-                    continue;
-                }
-            }
-            let four = level.neighbours(texel, texels.address);
-            let known = pixels[i].max(floor);
-            pixels[i] = pixels[i].max(self.critical(four, weights(part), known));
-            i += 1;
-        }
+            let four = patch.level.neighbours(texel, patch.address);
+            *pixel = pixel.max(self.critical(four, weights(part), known));
+            above |= u64::from(*pixel >= ceiling) << sample;
+        });
+        above
     }
 
     /// The highest threshold at which four texels pass the test, if it is above `known`.

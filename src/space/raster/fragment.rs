@@ -1,8 +1,8 @@
 //! What the material of one triangle gives at its samples: alpha test and base colour.
 
 use super::camera::{Corner, SUBSAMPLES};
-use super::piece::{MOST_OFF, Piece, longest};
-use super::row::TexelRow;
+use super::edges::TILE;
+use super::patch::Patch;
 use super::texture::{Address, Texture, UNIT};
 use super::triangle::{Plane, Triangle};
 use super::{Material, Mips, Sampling, Scene};
@@ -17,11 +17,12 @@ pub(super) struct Fragment<'a> {
     /// The level of the whole triangle, where lines of sight are parallel or as good as that.
     lod: Option<f32>,
     mips: Mips,
-    /// Samples of a row over which texture coordinates are as good as straight, a power of two.
-    piece: i32,
     /// Vertex alpha, where vertices have colours.
     alpha: Option<Plane>,
 }
+
+/// Largest displacement of a texture, in samples. Corners are snapped to 1/256 of one.
+const MOST_OFF: f32 = 1.0 / 32.0;
 
 /// Whether a triangle is so small against its distance that one level of its texture is right for
 /// all of it, within .02 levels: such a triangle's corners are `1 / q` away.
@@ -73,12 +74,8 @@ impl<'a> Fragment<'a> {
             q: triangle.plane(q),
             lod: None,
             mips: sampling.mips,
-            piece: 1,
             alpha: None,
         };
-        if !flat {
-            fragment.piece = longest(fragment.q.dx, q[0].min(q[1]).min(q[2]));
-        }
         if texture.is_some() {
             let uv = indices.map(|i| uvs[i as usize]);
             fragment.u = triangle.plane(std::array::from_fn(|i| uv[i].x * q[i]));
@@ -160,66 +157,40 @@ impl<'a> Fragment<'a> {
         self.material.cutoff.is_none_or(|cutoff| alpha >= cutoff)
     }
 
-    /// Alpha test of the samples of a row from `from` on that are not hit yet.
-    pub fn test_row(&self, y: i32, from: i32, samples: &mut [u8]) {
-        match (self.texture, self.lod, self.material.cutoff) {
-            (Some(texture), Some(lod), Some(cutoff)) if self.is_flat() && self.alpha.is_none() => {
-                // The usual case, with everything that is the same in the row taken out.
-                let (mip, address) = (texture.mip(lod), self.address());
-                let (u, v) = (self.u.row(y), self.v.row(y));
+    /// Alpha test of the `open` samples of the tile that begins at a sample: bit `8 y + x`.
+    pub fn test_tile(&self, first: [i32; 2], open: u64) -> u64 {
+        let Some(cutoff) = self.material.cutoff else {
+            return open;
+        };
+        match self.patch(first) {
+            Some(patch) => {
                 let factor = self.material.factor[3];
-                if mip.is_single() {
-                    let level = mip.level();
-                    let row = TexelRow {
-                        level,
-                        u,
-                        v,
-                        address,
-                    };
-                    return row.test(from, samples, |alpha| factor * (alpha * UNIT) >= cutoff);
-                }
-                for (sample, x) in samples.iter_mut().zip(from..).filter(|(s, _)| **s == 0) {
-                    let alpha = mip.alpha([u.value(x), v.value(x)], address);
-                    *sample = (factor * alpha >= cutoff) as u8;
-                }
+                patch.test(open, |alpha| factor * (alpha * UNIT) >= cutoff)
             }
-            (Some(texture), Some(lod), Some(cutoff))
-                if self.alpha.is_none() && texture.mip(lod).is_single() =>
-            {
-                let (level, address) = (texture.mip(lod).level(), self.address());
-                let rows = [self.u.row(y), self.v.row(y), self.q.row(y)];
-                let factor = self.material.factor[3];
-                let (mut from, mut rest) = (from, samples);
-                while !rest.is_empty() {
-                    let Piece { end, u, v } = Piece::of(rows, from, self.piece);
-                    let length = (end - from) as usize;
-                    let (piece, after) = rest.split_at_mut(length.min(rest.len()));
-                    let row = TexelRow {
-                        level,
-                        u,
-                        v,
-                        address,
-                    };
-                    row.test(from, piece, |alpha| factor * (alpha * UNIT) >= cutoff);
-                    (from, rest) = (end, after);
+            None => {
+                let (mut left, mut passed) = (open, 0);
+                while left != 0 {
+                    let sample = left.trailing_zeros() as i32;
+                    left &= left - 1;
+                    let passes = self.passes(first[0] + sample % TILE, first[1] + sample / TILE);
+                    passed |= u64::from(passes) << sample;
                 }
-            }
-            _ => {
-                let todo = samples.iter_mut().zip(from..).filter(|(s, _)| **s == 0);
-                todo.for_each(|(sample, x)| *sample = self.passes(x, y) as u8);
+                passed
             }
         }
     }
 
-    /// Where the samples of a row read the base level; `None` without a texture, or where lines of
-    /// sight meet.
-    pub fn base_row(&self, y: i32) -> Option<TexelRow<'a>> {
-        let texture = self.texture.filter(|_| self.is_flat())?;
-        Some(TexelRow {
-            level: texture.base(),
-            u: self.u.row(y),
-            v: self.v.row(y),
+    /// Where the tile that begins at a sample reads its texture, where that is one level and nothing
+    /// else tells alpha.
+    #[inline]
+    pub fn patch(&self, first: [i32; 2]) -> Option<Patch<'a>> {
+        let mip = self.texture?.mip(self.lod?);
+        (self.alpha.is_none() && mip.is_single()).then(|| Patch {
+            level: mip.level(),
             address: self.address(),
+            uv: [self.u, self.v],
+            divisor: (!self.is_flat()).then_some(self.q),
+            first,
         })
     }
 

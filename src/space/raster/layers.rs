@@ -2,7 +2,8 @@
 
 use glam::{Vec2, Vec3};
 
-use super::draw::{EMPTY, Front};
+use super::draw::EMPTY;
+use super::front::Front;
 use super::pane::Panes;
 use super::relief::Relief;
 use super::shade::Light;
@@ -27,8 +28,8 @@ pub struct Layers {
     pub distance: Vec<f32>,
 }
 
-/// Draws where the scene is and how it looks. Of all samples that are hit 4 x 4 a pixel are shaded; where
-/// there are more they tell coverage alone. `reliefs` are the materials' normal maps, as many as materials or none.
+/// Draws where the scene is and how it looks. Of all samples that are hit 4 x 4 a pixel have a colour; where
+/// there are more they tell coverage alone. Four neighbours of these that show one triangle are shaded once. `reliefs` are the materials' normal maps, as many as materials or none.
 pub fn layers(
     scene: &Scene,
     camera: &Camera,
@@ -46,15 +47,16 @@ pub fn layers(
     let mut front = Front::default();
     for (pane, ids) in Panes::new(scene, &corners, size, side).each() {
         front.draw(scene, &corners, sampling, &pane, ids);
-        for (y, items) in (pane.y[0]..).zip(front.items.chunks_exact(pane.width())) {
-            let at = y as usize * size[0] as usize + pane.x[0] as usize;
-            let hits = mask.samples[at..].iter_mut().zip(items);
-            hits.for_each(|(hit, &item)| *hit = u8::from(item != EMPTY));
+        for y in 0..pane.height() {
+            let at = (pane.y[0] as usize + y) * size[0] as usize + pane.x[0] as usize;
+            for (x, hit) in mask.samples[at..at + pane.width()].iter_mut().enumerate() {
+                *hit = u8::from(front.at([x, y]).0 != EMPTY);
+            }
         }
         shader.shade(&front, &pane, ids, |[x, y], seen| {
             let pixel = (y / side * camera.width as i32 + x / side) as usize;
             layers.add(pixel, &seen, camera.perspective);
-            samples[pixel] += 1;
+            samples[pixel] += seen.samples;
         });
     }
     layers.coverage = mask.coverage().fraction;
@@ -77,15 +79,17 @@ impl Layers {
 
     /// Adds what is seen at a sample of a pixel.
     fn add(&mut self, pixel: usize, seen: &Shaded, perspective: bool) {
+        let share = seen.samples as f32;
         for (sum, value) in self.color[pixel].iter_mut().zip(seen.light) {
-            *sum += value;
+            *sum += value * share;
         }
-        self.normal[pixel] += seen.normal;
-        self.distance[pixel] += if perspective {
+        self.normal[pixel] += seen.normal * share;
+        let distance = if perspective {
             1.0 / seen.near
         } else {
             -seen.near
         };
+        self.distance[pixel] += distance * share;
     }
 
     /// From sums over so many samples of each pixel to means over all that it has.

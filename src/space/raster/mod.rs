@@ -16,25 +16,26 @@
 //!
 //! One call works on one thread and gives the same bits everywhere; callers spread views.
 
+mod bits;
 mod blocks;
 mod camera;
 mod coverage;
 mod critical;
 mod draw;
+mod edges;
 mod fragment;
+mod front;
 mod image;
 mod layers;
 mod mips;
 mod msaa;
 mod pane;
-mod piece;
+mod patch;
 mod relief;
-mod row;
 mod seen;
 mod shade;
 mod shader;
 mod texture;
-mod tiles;
 mod triangle;
 
 pub use camera::{Camera, Placement};

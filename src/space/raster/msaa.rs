@@ -6,9 +6,9 @@
 
 use super::camera::SUBSAMPLES;
 use super::coverage::Coverage;
+use super::edges::{Edges, PIXELS, Reached, each_tile};
 use super::pane::Pane;
-use super::row::is_all;
-use super::seen::hitting;
+use super::seen::{Seen, hitting};
 use super::{Camera, Mips, Sampling, Scene};
 
 /// The standard places of four samples, in 16ths of a pixel from its corner (Vulkan 1.3, 26.4
@@ -21,8 +21,8 @@ const SHADING: Sampling = Sampling {
     mips: Mips::Linear,
 };
 
-/// A bit for each sample of a pixel.
-const ALL: u8 = (1 << PLACES.len()) - 1;
+/// The samples of a pixel.
+const PIXEL: u64 = 0xf;
 
 /// For every pixel which of its four samples are hit. What does not change is drawn once, and the
 /// rest over copies of it.
@@ -30,8 +30,9 @@ const ALL: u8 = (1 << PLACES.len()) - 1;
 pub struct Multisampled {
     width: u32,
     height: u32,
-    /// A bit for each sample, rows of pixels from the top.
-    hits: Vec<u8>,
+    /// Tiles of 4 x 4 pixels, rows from the top: bit `16 y + 4 x + place` each. Beyond the picture
+    /// everything counts as hit, so that a tile that is full inside is full.
+    tiles: Vec<u64>,
 }
 
 /// Draws where the scene is, as a client with fourfold multisampling does.
@@ -44,66 +45,104 @@ pub fn coverage_multisampled(scene: &Scene, camera: &Camera) -> Coverage {
 impl Multisampled {
     /// A picture of nothing.
     pub fn empty(camera: &Camera) -> Self {
+        let Camera { width, height, .. } = *camera;
+        let [across, down] = [width, height].map(|s| s.div_ceil(PIXELS as u32));
+        let outside = |tile: u32| {
+            let first = [tile % across, tile / across].map(|t| t * PIXELS as u32);
+            pixels_of_tile(first, [width, height]).fold(!0, |hit, (_, at)| hit & !(PIXEL << at))
+        };
         Self {
-            width: camera.width,
-            height: camera.height,
-            hits: vec![0; camera.width as usize * camera.height as usize],
+            width,
+            height,
+            tiles: (0..across * down).map(outside).collect(),
         }
     }
 
     /// Adds what a scene covers, seen by a camera of the same size.
     pub fn draw(&mut self, scene: &Scene, camera: &Camera) {
         let corners = camera.project(scene.geometry.positions, SHADING.side);
-        let (width, height) = (self.width as i32, self.height as i32);
-        let hits = &mut self.hits;
         let places = PLACES.map(|(x, y)| [x, y].map(|p| p * SUBSAMPLES / 16));
-        let whole = Pane::of([width, height]);
         for shown in hitting(scene, &corners, places) {
-            let mut fragment = None;
-            shown.triangle.rows(&whole, places, |y, row| {
-                let first = (y * width) as usize;
-                let [from, to] = row.reach().map(|x| first + x as usize);
-                // Inside a crown most pixels are full: edges are not even looked at.
-                if is_all::<ALL>(&hits[from..to]) {
-                    return;
-                }
-                let spans = row.spans();
-                let inside = |s: &&(i32, i32)| s.0 < s.1;
-                let from = spans.iter().filter(inside).map(|s| s.0).min().unwrap_or(0);
-                let to = spans.iter().filter(inside).map(|s| s.1).max().unwrap_or(0);
-                let row = &mut hits[first + from as usize..first + to as usize];
-                for (hit, x) in row.iter_mut().zip(from..).filter(|(hit, _)| **hit != ALL) {
-                    let mut here = 0u8;
-                    for (bit, span) in spans.iter().enumerate() {
-                        here |= u8::from(span.0 <= x && x < span.1) << bit;
-                    }
-                    // One shading a pixel, as a client does: all its samples share the answer.
-                    let seen = here & !*hit != 0
-                        && (shown.material.cutoff.is_none()
-                            || fragment
-                                .get_or_insert_with(|| shown.fragment(scene, SHADING))
-                                .passes(x, y));
-                    if seen {
-                        *hit |= here;
-                    }
-                }
-            });
+            self.add(&shown, scene, places);
         }
+    }
+
+    fn add(&mut self, shown: &Seen, scene: &Scene, places: [[i32; 2]; 4]) {
+        let whole = Pane::of([self.width, self.height].map(|s| s as i32));
+        let Some(reached) = shown.triangle.reach_at(&whole, places) else {
+            return;
+        };
+        let across = self.width.div_ceil(PIXELS as u32) as i32;
+        let (mut edges, mut fragment) = (None, None);
+        each_tile(reached, PIXELS, |Reached { tile, xs, ys }| {
+            let first = tile.map(|t| t * PIXELS);
+            let hits = &mut self.tiles[(tile[1] * across + tile[0]) as usize];
+            // Inside a crown most tiles are full: edges are not even looked at.
+            if *hits == !0 {
+                return;
+            }
+            let edges = edges.get_or_insert_with(|| Edges::new(&shown.triangle, places));
+            let mut open = edges.pixels(first, xs, ys) & !*hits;
+            if shown.material.cutoff.is_none() {
+                *hits |= open;
+                return;
+            }
+            // One shading a pixel, as a client does: all its samples share the answer.
+            while open != 0 {
+                let pixel = open.trailing_zeros() as i32 / 4;
+                let samples = open & PIXEL << (4 * pixel);
+                open &= !samples;
+                let [x, y] = [first[0] + pixel % PIXELS, first[1] + pixel / PIXELS];
+                let fragment = fragment.get_or_insert_with(|| shown.fragment(scene, SHADING));
+                if fragment.passes(x, y) {
+                    *hits |= samples;
+                }
+            }
+        });
     }
 
     /// Covered area in pixels.
     pub fn area(&self) -> f64 {
-        let hit: u64 = self.hits.iter().map(|h| u64::from(h.count_ones())).sum();
-        hit as f64 / PLACES.len() as f64
+        let hit: u64 = self.tiles.iter().map(|t| u64::from(t.count_ones())).sum();
+        let side = PIXELS as u32;
+        let all =
+            self.width.next_multiple_of(side) as u64 * self.height.next_multiple_of(side) as u64;
+        let outside = all - self.width as u64 * self.height as u64;
+        hit as f64 / PLACES.len() as f64 - outside as f64
     }
 
     /// For every pixel the share of its samples that are hit.
     pub fn coverage(&self) -> Coverage {
-        let share = |h: &u8| h.count_ones() as f32 / PLACES.len() as f32;
+        let size = [self.width, self.height];
+        let across = self.width.div_ceil(PIXELS as u32);
+        let mut fraction = vec![0.0; self.width as usize * self.height as usize];
+        for (number, tile) in (0..).zip(&self.tiles) {
+            let first = [number % across, number / across].map(|t| t * PIXELS as u32);
+            for (pixel, at) in pixels_of_tile(first, size) {
+                fraction[pixel] = (tile >> at & PIXEL).count_ones() as f32 / PLACES.len() as f32;
+            }
+        }
         Coverage {
             width: self.width,
             height: self.height,
-            fraction: self.hits.iter().map(share).collect(),
+            fraction,
         }
     }
+}
+
+/// The pixels of a picture of this size that lie in the tile which begins at one, each with the
+/// place of its first bit.
+fn pixels_of_tile(
+    [x, y]: [u32; 2],
+    [width, height]: [u32; 2],
+) -> impl Iterator<Item = (usize, u32)> {
+    let side = PIXELS as u32;
+    let rows = (0..side).take_while(move |down| y + down < height);
+    rows.flat_map(move |down| {
+        let columns = (0..side).take_while(move |right| x + right < width);
+        columns.map(move |right| {
+            let pixel = (y + down) as usize * width as usize + (x + right) as usize;
+            (pixel, 4 * (side * down + right))
+        })
+    })
 }

@@ -37,10 +37,10 @@ impl Pane {
         (self.y[1] - self.y[0]) as usize
     }
 
-    /// Where a row starts in a buffer that holds this pane alone.
+    /// The picture's sample that is so many columns and rows from the pane's first.
     #[inline]
-    pub fn row(&self, y: i32) -> usize {
-        (y - self.y[0]) as usize * self.width()
+    pub fn place(&self, [x, y]: [usize; 2]) -> [i32; 2] {
+        [self.x[0] + x as i32, self.y[0] + y as i32]
     }
 }
 

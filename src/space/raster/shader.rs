@@ -3,7 +3,8 @@
 use glam::Vec3;
 
 use super::camera::Corner;
-use super::draw::{EMPTY, Front};
+use super::draw::EMPTY;
+use super::front::Front;
 use super::pane::Pane;
 use super::relief::{Bumps, Relief};
 use super::shade::{Light, Surface};
@@ -23,6 +24,8 @@ pub(super) struct Shaded {
     pub normal: Vec3,
     /// As [`super::Items::near`].
     pub near: f32,
+    /// How many samples look like this.
+    pub samples: u32,
 }
 
 /// A triangle that is ready to be shaded.
@@ -81,17 +84,25 @@ impl<'a> Shader<'a> {
         let side = self.sampling.side as usize;
         // Which samples are shaded: all of 4 x 4, as many of more.
         let stride = (side / SHADED).max(1);
-        let chosen = |size: usize| (stride / 2..size).step_by(stride);
-        for y in chosen(pane.height()) {
-            for x in chosen(pane.width()) {
-                self.sample(front, pane, ids, [x, y], &mut add);
+        let chosen = |size: usize, stride_of: usize| (stride / 2..size).step_by(stride_of);
+        // Four neighbours are shaded as one where that leaves 2 x 2 or more of a pixel.
+        let step = match side / stride == SHADED && side.is_multiple_of(SHADED) {
+            true => 2 * stride,
+            false => stride,
+        };
+        for y in chosen(pane.height(), step) {
+            for x in chosen(pane.width(), step) {
+                match step > stride {
+                    true => self.four(front, pane, ids, [x, y], stride, &mut add),
+                    false => self.sample(front, pane, ids, [x, y], &mut add),
+                }
             }
         }
         if stride == 1 {
             return;
         }
         // Pixels that are hit, but at none of the chosen samples: the first hit stands for all.
-        let hit = |[x, y]: [usize; 2]| front.items[y * pane.width() + x] != EMPTY;
+        let hit = |at: [usize; 2]| front.at(at).0 != EMPTY;
         for y in (0..pane.height()).step_by(side) {
             for x in (0..pane.width()).step_by(side) {
                 let samples = |stride: usize| {
@@ -109,26 +120,68 @@ impl<'a> Shader<'a> {
         }
     }
 
+    /// Shades four samples `stride` apart, given as column and row of the first in the pane: once in
+    /// their middle where one triangle is seen at all of them.
+    fn four(
+        &mut self,
+        front: &Front,
+        pane: &Pane,
+        ids: &[u32],
+        [x, y]: [usize; 2],
+        stride: usize,
+        add: &mut impl FnMut([i32; 2], Shaded),
+    ) {
+        let places = [
+            [x, y],
+            [x + stride, y],
+            [x, y + stride],
+            [x + stride, y + stride],
+        ];
+        let seen = places.map(|at| front.at(at));
+        let item = seen[0].0;
+        if seen.iter().any(|s| s.0 != item) {
+            for at in places {
+                self.sample(front, pane, ids, at, add);
+            }
+        } else if item != EMPTY {
+            let near = seen.iter().map(|s| s.1).sum::<f32>() / 4.0;
+            let half = stride as f32 / 2.0;
+            self.add(ids, (item, near), pane.place([x, y]), half, 4, add);
+        }
+    }
+
     /// Shades a sample, given as column and row of the pane, if anything is seen there.
     fn sample(
         &mut self,
         front: &Front,
         pane: &Pane,
         ids: &[u32],
-        [x, y]: [usize; 2],
+        at: [usize; 2],
         add: &mut impl FnMut([i32; 2], Shaded),
     ) {
-        let sample = y * pane.width() + x;
-        let item = front.items[sample];
-        if item == EMPTY {
-            return;
+        let seen = front.at(at);
+        if seen.0 != EMPTY {
+            self.add(ids, seen, pane.place(at), 0.0, 1, add);
         }
+    }
+
+    /// Shades a triangle of the pane's list `off` samples right of and below a sample; it stands for so
+    /// many.
+    #[inline]
+    fn add(
+        &mut self,
+        ids: &[u32],
+        (item, near): (u32, f32),
+        place: [i32; 2],
+        off: f32,
+        samples: u32,
+        add: &mut impl FnMut([i32; 2], Shaded),
+    ) {
         let Some(known) = self.place(item, ids) else {
             return;
         };
         let (_, Known { surface, bumps }) = &self.known[known];
-        let place = [pane.x[0] + x as i32, pane.y[0] + y as i32];
-        let at = place.map(|p| p as f32);
+        let at = place.map(|p| p as f32 + off);
         let (albedo, mut normal, q) = surface.at(at);
         if let Some(bumps) = bumps {
             normal = bumps.at(at, q, normal * surface.side) * surface.side;
@@ -137,7 +190,8 @@ impl<'a> Shader<'a> {
         let seen = Shaded {
             light: albedo.map(|c| c * lit),
             normal,
-            near: front.near[sample],
+            near,
+            samples,
         };
         add(place, seen);
     }

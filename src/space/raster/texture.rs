@@ -101,11 +101,6 @@ impl Texture {
         (level.width, level.height, &level.alpha)
     }
 
-    /// The base level.
-    pub(super) fn base(&self) -> &Level {
-        &self.levels[0]
-    }
-
     /// The levels that a level of detail lies between, 0 being the base.
     pub(super) fn mip(&self, lod: f32) -> Mip<'_> {
         let last = self.levels.len() - 1;
@@ -240,14 +235,6 @@ impl Level {
         inside
             .then(|| self.blocks.get(texel[0], texel[1]))
             .flatten()
-    }
-
-    /// The texels (left above; end) for which [`Level::block`] has the answer that it has for one.
-    #[inline]
-    pub fn block_around(&self, texel: [i32; 2]) -> ([i32; 2], [i32; 2]) {
-        let low = texel.map(|t| t & !(BLOCK - 1));
-        let end = [self.width as i32 - 1, self.height as i32 - 1];
-        (low, std::array::from_fn(|i| (low[i] + BLOCK).min(end[i])))
     }
 
     /// Alpha mixed from a texel and its neighbours, in units of 1 / (255 * 65536).

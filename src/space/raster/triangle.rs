@@ -31,8 +31,19 @@ pub(super) struct Plane {
 }
 
 impl Plane {
+    #[cfg(test)]
+    pub fn new(at: f32, [dx, dy]: [f32; 2], [x0, y0]: [f32; 2]) -> Self {
+        Self { at, dx, dy, x0, y0 }
+    }
+
+    /// The column of the corner from which it is counted: one for all planes of a triangle.
+    #[inline]
+    pub fn x0(&self) -> f32 {
+        self.x0
+    }
+
     pub fn value(&self, x: i32, y: i32) -> f32 {
-        self.row(y).value(x)
+        self.left(y) + self.across(x)
     }
 
     /// At a place between samples.
@@ -41,13 +52,16 @@ impl Plane {
         self.at + self.dy * (y - self.y0) + self.dx * (x - self.x0)
     }
 
-    /// The values of a row.
-    pub fn row(&self, y: i32) -> Row {
-        Row {
-            at: self.at + self.dy * (y as f32 - self.y0),
-            dx: self.dx,
-            x0: self.x0,
-        }
+    /// The part of a row's values that is the same in all of it.
+    #[inline]
+    pub fn left(&self, y: i32) -> f32 {
+        self.at + self.dy * (y as f32 - self.y0)
+    }
+
+    /// What a column adds to [`Self::left`].
+    #[inline]
+    pub fn across(&self, x: i32) -> f32 {
+        self.dx * (x as f32 - self.x0)
     }
 }
 
@@ -61,22 +75,6 @@ impl Plane {
         // Each of these terms, and so the sum, is rounded.
         let size = self.at.abs() + across.abs() + down.abs() + within;
         self.at + across + down + within + size * 4.0 * f32::EPSILON
-    }
-}
-
-/// A [`Plane`] along one row of samples.
-#[derive(Clone, Copy)]
-pub(super) struct Row {
-    pub at: f32,
-    /// Change from a sample to the next.
-    pub dx: f32,
-    pub x0: f32,
-}
-
-impl Row {
-    #[inline]
-    pub fn value(&self, x: i32) -> f32 {
-        self.at + self.dx * (x as f32 - self.x0)
     }
 }
 
@@ -106,6 +104,12 @@ impl Triangle {
         })
     }
 
+    /// The ends of its edges, the inner side to the right of each.
+    pub fn sides(&self) -> [(&Corner, &Corner); 3] {
+        let [a, b, c] = &self.corners;
+        [(a, b), (b, c), (c, a)]
+    }
+
     /// How a quantity with these values at the model's corners varies over the screen.
     pub fn plane(&self, values: [f32; 3]) -> Plane {
         let [a, b, c] = &self.corners;
@@ -130,42 +134,17 @@ impl Triangle {
 
     /// The first and last column, and row, of a pane that may have samples inside, if any.
     pub fn reach(&self, pane: &Pane) -> Option<[[i32; 2]; 2]> {
-        reach(&self.corners, pane, CENTER)
+        self.reach_at(pane, CENTER)
     }
 
-    /// Calls `span(y, from, to)` for every row with samples `from..to` inside.
-    pub fn scan(&self, pane: &Pane, mut span: impl FnMut(i32, i32, i32)) {
-        self.rows(pane, CENTER, |y, row| {
-            let [(from, to)] = row.spans();
-            if from < to {
-                span(y, from, to);
-            }
-        });
-    }
-
-    /// Calls `row(y, ..)` for every row of a pane that the triangle may reach, with samples at several
-    /// `places` of each pixel, in sub-samples from its left upper corner. Who needs nothing of a row
-    /// does not ask for its spans, and saves most of what it costs.
-    pub fn rows<const N: usize>(
+    /// As [`Self::reach`], of pixels with samples at several places, in sub-samples from their left
+    /// upper corners.
+    pub fn reach_at<const N: usize>(
         &self,
         pane: &Pane,
         places: [[i32; 2]; N],
-        mut row: impl FnMut(i32, &mut Spans<N>),
-    ) {
-        let Some([x, [y0, y1]]) = reach(&self.corners, pane, places) else {
-            return;
-        };
-        let mut spans = Spans {
-            triangle: self,
-            x,
-            y: [y0, y0],
-            places,
-            edges: None,
-        };
-        for y in y0..=y1 {
-            spans.y[1] = y;
-            row(y, &mut spans);
-        }
+    ) -> Option<[[i32; 2]; 2]> {
+        reach(&self.corners, pane, places)
     }
 }
 
@@ -210,165 +189,11 @@ pub(super) fn may_hit<const N: usize>(corners: &[Corner; 3], places: [[i32; 2]; 
         .any(|&[x, y]| between(x0, x1, x) && between(y0, y1, y))
 }
 
-/// A row of a triangle with `N` samples a pixel.
-pub(super) struct Spans<'t, const N: usize> {
-    triangle: &'t Triangle,
-    /// First and last pixel that may be inside.
-    x: [i32; 2],
-    /// The triangle's first row, and this one.
-    y: [i32; 2],
-    places: [[i32; 2]; N],
-    /// At the first pixel of the first row; made on first use.
-    edges: Option<[[Edge; 3]; N]>,
-}
-
-impl<const N: usize> Spans<'_, N> {
-    /// The pixels `from..to` outside of which nothing is inside.
-    #[inline]
-    pub fn reach(&self) -> [i32; 2] {
-        [self.x[0], self.x[1] + 1]
-    }
-
-    /// For each place the pixels `from..to` whose sample there is inside; equal ends: none.
-    #[inline]
-    pub fn spans(&mut self) -> [(i32, i32); N] {
-        let ([x0, x1], [y0, y]) = (self.x, self.y);
-        let (triangle, places) = (self.triangle, self.places);
-        let edges = self
-            .edges
-            .get_or_insert_with(|| triangle.edges([x0, y0].map(|o| o * SUBSAMPLES), places));
-        let below = (y - y0) as i64;
-        std::array::from_fn(|i| {
-            let edges = edges[i].map(|edge| Edge {
-                value: edge.value + below * edge.down,
-                ..edge
-            });
-            let (from, to) = if x1 - x0 < SHORT_ROW {
-                step_row(&edges, x1 - x0)
-            } else {
-                solve_row(&edges, x1 - x0)
-            };
-            (x0 + from, x0 + to)
-        })
-    }
-}
-
-impl Triangle {
-    /// The edges at each place of a pixel.
-    fn edges<const N: usize>(&self, [x, y]: [i32; 2], places: [[i32; 2]; N]) -> [[Edge; 3]; N] {
-        let [a, b, c] = &self.corners;
-        let at_corner = [(a, b), (b, c), (c, a)].map(|(from, to)| Edge::new(from, to, [x, y]));
-        places.map(|[px, py]| at_corner.map(|edge| edge.moved(px, py)))
-    }
-}
-
 /// The place of a pixel's only sample.
 pub(super) const CENTER: [[i32; 2]; 1] = [[SUBSAMPLES / 2; 2]];
-
-/// Rows shorter than this are stepped through; longer ones are solved for their ends.
-const SHORT_ROW: i32 = 4;
 
 fn cross(a: &Corner, b: &Corner, c: &Corner) -> i64 {
     let (bx, by) = ((b.x - a.x) as i64, (b.y - a.y) as i64);
     let (cx, cy) = ((c.x - a.x) as i64, (c.y - a.y) as i64);
     bx * cy - by * cx
-}
-
-/// An edge function: not negative on the inner side.
-#[derive(Clone, Copy)]
-struct Edge {
-    value: i64,
-    right: i64,
-    down: i64,
-    /// One over the size of `right`.
-    per_right: f64,
-}
-
-impl Edge {
-    /// At a point in sub-samples.
-    fn new(from: &Corner, to: &Corner, [x, y]: [i32; 2]) -> Self {
-        let (dx, dy) = ((to.x - from.x) as i64, (to.y - from.y) as i64);
-        let grain = SUBSAMPLES as i64;
-        let (px, py) = (x as i64 - from.x as i64, y as i64 - from.y as i64);
-        // A sample on the edge itself belongs to the triangle whose top or left edge it is.
-        let owns = dy < 0 || (dy == 0 && dx > 0);
-        let right = -dy * grain;
-        Self {
-            value: dx * py - dy * px - if owns { 0 } else { 1 },
-            right,
-            down: dx * grain,
-            per_right: 1.0 / right.abs() as f64,
-        }
-    }
-
-    /// The same edge at a place so many sub-samples to the right and below.
-    fn moved(self, x: i32, y: i32) -> Self {
-        let grain = SUBSAMPLES as i64;
-        Self {
-            value: self.value + (self.down / grain) * y as i64 + (self.right / grain) * x as i64,
-            ..self
-        }
-    }
-
-    /// The first step to the right that is inside, where `right` is positive.
-    fn enters(&self) -> i64 {
-        if self.value >= 0 {
-            return 0;
-        }
-        // A multiplication that is off by less than one, then put right.
-        let steps = (-self.value as f64 * self.per_right) as i64;
-        steps + i64::from(steps.saturating_mul(self.right) < -self.value)
-    }
-
-    /// The last step to the right that is inside, where `right` is negative; -1 if none is.
-    fn leaves(&self) -> i64 {
-        if self.value < 0 {
-            return -1;
-        }
-        let steps = (self.value as f64 * self.per_right) as i64;
-        let (over, next) = (
-            steps.saturating_mul(-self.right),
-            (steps + 1).saturating_mul(-self.right),
-        );
-        steps - i64::from(over > self.value) + i64::from(next <= self.value)
-    }
-}
-
-/// The samples `from..to` of a row that are inside, by trying each one.
-fn step_row(edges: &[Edge; 3], last: i32) -> (i32, i32) {
-    let [mut a, mut b, mut c] = edges.map(|e| e.value);
-    let (mut from, mut to) = (0, 0);
-    for x in 0..=last {
-        if (a | b | c) >= 0 {
-            if to == 0 {
-                from = x;
-            }
-            to = x + 1;
-        } else if to > 0 {
-            break;
-        }
-        a += edges[0].right;
-        b += edges[1].right;
-        c += edges[2].right;
-    }
-    (from, to)
-}
-
-/// The samples `from..to` of a row that are inside, by solving for both ends.
-fn solve_row(edges: &[Edge; 3], last: i32) -> (i32, i32) {
-    let (mut from, mut to) = (0i64, last as i64);
-    for edge in edges {
-        if edge.right > 0 {
-            from = from.max(edge.enters());
-        } else if edge.right < 0 {
-            to = to.min(edge.leaves());
-        } else if edge.value < 0 {
-            return (0, 0);
-        }
-    }
-    if from <= to {
-        (from as i32, to as i32 + 1)
-    } else {
-        (0, 0)
-    }
 }
