@@ -22,8 +22,8 @@ pub const VISIBLE_DELTA_E: f32 = 8.0;
 const SIDE: f32 = 24.0;
 
 /// For each card how far the mean colours of its sides are apart, CIE delta E 1976.
-pub fn differences(model: &Model, groups: &[CardGroup]) -> Vec<f32> {
-    let of_card = |group: &CardGroup| difference(model, group);
+pub fn differences(model: &Model, groups: &[&CardGroup]) -> Vec<f32> {
+    let of_card = |group: &&CardGroup| difference(model, group);
     groups.par_iter().map(of_card).collect()
 }
 
@@ -110,17 +110,17 @@ mod tests {
     fn a_leaf_with_a_green_back_differs_and_one_sheet_does_not() {
         let (model, group) = leaf(true);
         // Red and green of sRGB are 170 apart.
-        let found = differences(&model, &[group])[0];
+        let found = differences(&model, &[&group])[0];
         assert!((found - 170.6).abs() < 1.0, "{found}");
         let (model, group) = leaf(false);
-        assert_eq!(differences(&model, &[group]), [0.0]);
+        assert_eq!(differences(&model, &[&group]), [0.0]);
     }
 
     #[test]
     fn a_point_without_extent_has_no_sides() {
         let (model, mut group) = leaf(true);
         group.card.outline = vec![Vec2::ZERO; 3];
-        assert_eq!(differences(&model, &[group]), [0.0]);
+        assert_eq!(differences(&model, &[&group]), [0.0]);
     }
 
     #[test]

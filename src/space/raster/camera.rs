@@ -1,6 +1,7 @@
 //! Cameras: from model space to snapped sample coordinates.
 
 use glam::{DVec3, Vec2, Vec3};
+use wide::{f32x4, i32x4};
 
 /// A similarity that puts a model into the space that the camera looks at: `offset + scale * p`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -132,51 +133,70 @@ impl Camera {
         }
     }
 
-    /// Projects model-space points to a grid of `side` samples a pixel.
+    /// Projects model-space points to a grid of `side` samples a pixel, four at a time.
     pub(super) fn project(&self, points: &[Vec3], side: u32) -> Vec<Corner> {
-        let scale = side as f32 * SUBSAMPLES as f32;
+        let mut corners = Vec::with_capacity(points.len());
+        let (fours, rest) = points.as_chunks::<4>();
+        for four in fours {
+            corners.extend(self.project_four(four, side));
+        }
+        if let Some(&last) = rest.last() {
+            let four = std::array::from_fn(|i| *rest.get(i).unwrap_or(&last));
+            corners.extend(&self.project_four(&four, side)[..rest.len()]);
+        }
+        corners
+    }
+
+    #[inline]
+    fn project_four(&self, points: &[Vec3; 4], side: u32) -> [Corner; 4] {
+        let splat = f32x4::splat;
+        let scale = splat(side as f32 * SUBSAMPLES as f32);
         let middle = Vec2::new(self.width as f32, self.height as f32) * 0.5 + self.shift;
         // Placement and axes in one: coordinate = dot(axis, p) * scale + constant.
         let at = self.placement.offset - self.origin;
-        let k = self.placement.scale;
-        let project = |point: &Vec3| {
-            let point = *point * k + at;
-            let (x, y, z) = (
-                point.dot(self.right),
-                -point.dot(self.up),
-                point.dot(self.forward),
-            );
-            let (magnify, q, near) = if self.perspective {
-                if z < NEAR {
-                    return Corner::OUTSIDE;
-                }
-                (self.pixels / z, 1.0 / z, 1.0 / z)
-            } else {
-                (self.pixels, 1.0, -z)
-            };
-            let (x, y) = (
-                (middle.x + x * magnify) * scale,
-                (middle.y + y * magnify) * scale,
-            );
-            if !(x.abs() < LIMIT && y.abs() < LIMIT) {
-                return Corner::OUTSIDE;
-            }
-            Corner {
-                x: nearest(x),
-                y: nearest(y),
-                near,
-                q,
-            }
+        let k = splat(self.placement.scale);
+        let [a, b, c, d] = points;
+        let x = f32x4::new([a.x, b.x, c.x, d.x]) * k + splat(at.x);
+        let y = f32x4::new([a.y, b.y, c.y, d.y]) * k + splat(at.y);
+        let z = f32x4::new([a.z, b.z, c.z, d.z]) * k + splat(at.z);
+        let along = |axis: Vec3| x * splat(axis.x) + y * splat(axis.y) + z * splat(axis.z);
+        let (x, y, z) = (along(self.right), -along(self.up), along(self.forward));
+        let one = f32x4::ONE;
+        let (magnify, q, near) = match self.perspective {
+            true => (splat(self.pixels) / z, one / z, one / z),
+            false => (splat(self.pixels), one, -z),
         };
-        points.iter().map(project).collect()
+        let x = (splat(middle.x) + x * magnify) * scale;
+        let y = (splat(middle.y) + y * magnify) * scale;
+        let limit = splat(LIMIT);
+        let mut inside = x.abs().simd_lt(limit).to_bitmask() & y.abs().simd_lt(limit).to_bitmask();
+        if self.perspective {
+            inside &= z.simd_ge(splat(NEAR)).to_bitmask();
+        }
+        let [xs, ys] = [nearest(x), nearest(y)].map(i32x4::to_array);
+        let [nears, qs] = [near, q].map(f32x4::to_array);
+        let mut corners = [Corner::OUTSIDE; 4];
+        for (i, corner) in corners.iter_mut().enumerate() {
+            if inside >> i & 1 == 1 {
+                *corner = Corner {
+                    x: xs[i],
+                    y: ys[i],
+                    near: nears[i],
+                    q: qs[i],
+                };
+            }
+        }
+        corners
     }
 }
 
-/// Rounds half up; `round` is a call into the C library on plain x86-64.
-fn nearest(value: f32) -> i32 {
-    let value = value + 0.5;
-    let whole = value as i32;
-    whole - (whole as f32 > value) as i32
+/// Rounds half up; what lies beyond [`LIMIT`] has no answer.
+#[inline]
+fn nearest(value: f32x4) -> i32x4 {
+    let value = value + f32x4::HALF;
+    let whole = value.fast_trunc_int();
+    let above = f32x4::from_i32x4(whole).simd_gt(value) & f32x4::ONE;
+    whole - above.fast_trunc_int()
 }
 
 /// Corners are snapped to this part of a sample, as graphics processors do (8 bits).

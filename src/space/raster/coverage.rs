@@ -1,8 +1,8 @@
 //! Which samples a scene hits: alpha without colour or depth, the fast path.
 
 use super::bits::BitTiles;
-use super::edges::{Edges, Reached, TILE, each_tile};
-use super::seen::{Seen, hitting};
+use super::edges::{Edges, Reached, TILE, each_tile, lone};
+use super::seen::{Seen, may_reach, seen};
 use super::triangle::CENTER;
 use super::{Camera, Mips, Sampling, Scene};
 
@@ -78,10 +78,20 @@ impl Mask {
         let corners = camera.project(scene.geometry.positions, side);
         let size = [self.width * side, self.height * side].map(|s| s as i32);
         let mut picture = BitTiles::new(&self.samples, size);
-        let all = hitting(scene, &corners, CENTER);
-        let fragments = all
-            .map(|shown| hit::<COUNTED>(&shown, scene, sampling, &mut picture))
-            .sum();
+        let whole = picture.whole();
+        let mut fragments = 0;
+        for id in 0..scene.geometry.triangles.len() as u32 {
+            let Some(reached) = may_reach(scene, &corners, id, &whole, CENTER) else {
+                continue;
+            };
+            // Most triangles of a crown lie within one tile, and that is full.
+            if !COUNTED && lone(reached, TILE).is_some_and(|tile| *picture.at(tile) == !0) {
+                continue;
+            }
+            if let Some(shown) = seen(scene, &corners, id) {
+                fragments += hit::<COUNTED>(&shown, reached, scene, sampling, &mut picture);
+            }
+        }
         picture.write(&mut self.samples);
         fragments
     }
@@ -163,13 +173,11 @@ impl Coverage {
 #[inline]
 fn hit<const COUNTED: bool>(
     shown: &Seen,
+    reached: [[i32; 2]; 2],
     scene: &Scene,
     sampling: Sampling,
     picture: &mut BitTiles,
 ) -> u64 {
-    let Some(reached) = shown.triangle.reach(&picture.whole()) else {
-        return 0;
-    };
     let mut fragments = 0;
     let (mut edges, mut fragment) = (None, None);
     each_tile(reached, TILE, |Reached { tile, ys, .. }| {

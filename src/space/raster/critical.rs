@@ -11,7 +11,7 @@
 use super::bits::BitTiles;
 use super::edges::{Edges, Reached, TILE, each_tile};
 use super::patch::Patch;
-use super::seen::hitting;
+use super::seen::{may_reach, seen};
 use super::texture::BLOCK;
 use super::triangle::CENTER;
 use super::{Camera, Mask, Mips, Sampling, Scene};
@@ -63,8 +63,12 @@ pub fn critical(scene: &Scene, camera: &Camera, covered: &Mask, scores: Scores) 
     // Pixels above the range, whatever else covers them.
     let mut settled = BitTiles::new(&covered.samples, size);
     let mut pixels = vec![[f32::NEG_INFINITY; 64]; settled.count()];
-    for shown in hitting(scene, &corners, CENTER) {
-        let Some(reached) = shown.triangle.reach(&settled.whole()) else {
+    let whole = settled.whole();
+    for id in 0..scene.geometry.triangles.len() as u32 {
+        let Some(reached) = may_reach(scene, &corners, id, &whole, CENTER) else {
+            continue;
+        };
+        let Some(shown) = seen(scene, &corners, id) else {
             continue;
         };
         let (mut edges, mut fragment) = (None, None);

@@ -6,7 +6,7 @@
 
 use wide::i32x4;
 
-use super::camera::SUBSAMPLES;
+use super::camera::{Corner, SUBSAMPLES};
 use super::triangle::Triangle;
 
 /// Edge of a tile in samples.
@@ -24,6 +24,14 @@ pub(super) struct Reached {
     pub xs: [i32; 2],
     /// The rows of it that are reached.
     pub ys: [i32; 2],
+}
+
+/// The tile that holds all that is reached, if one does.
+#[inline]
+pub(super) fn lone([xs, ys]: [[i32; 2]; 2], side: i32) -> Option<[i32; 2]> {
+    let tiles = [xs, ys].map(|ends| ends.map(|at| at / side));
+    let [[x, last_x], [y, last_y]] = tiles;
+    (x == last_x && y == last_y).then_some([x, y])
 }
 
 /// Calls `each` for the tiles with `side` samples along an edge that hold the columns and rows from
@@ -56,25 +64,35 @@ struct Edge<const N: usize> {
     down: i64,
 }
 
+impl<const N: usize> Edge<N> {
+    #[inline(always)]
+    fn new(from: &Corner, to: &Corner, places: [[i32; 2]; N]) -> Self {
+        let (dx, dy) = (i64::from(to.x - from.x), i64::from(to.y - from.y));
+        // A sample on the edge itself belongs to the triangle whose top or left edge it is.
+        let owns = dy < 0 || (dy == 0 && dx > 0);
+        let mut at = [0; N];
+        for (at, [x, y]) in at.iter_mut().zip(places) {
+            let (px, py) = (i64::from(x - from.x), i64::from(y - from.y));
+            *at = (dx * py - dy * px - i64::from(!owns)).div_euclid(SUBSAMPLES.into());
+        }
+        Self {
+            at,
+            right: -dy,
+            down: dx,
+        }
+    }
+}
+
 /// The three edges of a triangle at `N` places of every pixel.
 pub(super) struct Edges<const N: usize>([Edge<N>; 3]);
 
 impl<const N: usize> Edges<N> {
     /// Of a triangle, at places in sub-samples from a pixel's left upper corner.
+    #[inline]
     pub fn new(triangle: &Triangle, places: [[i32; 2]; N]) -> Self {
-        Self(triangle.sides().map(|(from, to)| {
-            let (dx, dy) = (i64::from(to.x - from.x), i64::from(to.y - from.y));
-            // A sample on the edge itself belongs to the triangle whose top or left edge it is.
-            let owns = dy < 0 || (dy == 0 && dx > 0);
-            Edge {
-                at: places.map(|[x, y]| {
-                    let (px, py) = (i64::from(x - from.x), i64::from(y - from.y));
-                    (dx * py - dy * px - i64::from(!owns)).div_euclid(SUBSAMPLES.into())
-                }),
-                right: -dy,
-                down: dx,
-            }
-        }))
+        let [a, b, c] = triangle.sides();
+        let edge = |(from, to)| Edge::new(from, to, places);
+        Self([edge(a), edge(b), edge(c)])
     }
 
     /// The edges that some sample of a tile may lie outside of, at its first pixel; `None` where no
@@ -84,22 +102,22 @@ impl<const N: usize> Edges<N> {
         let last = i64::from(tile - 1);
         let mut crossing = self.0;
         for edge in &mut crossing {
-            let Edge { at, right, down } = *edge;
-            let first = i64::from(x) * right + i64::from(y) * down;
-            let at = at.map(|at| at + first);
-            let low = at.iter().fold(i64::MAX, |m, &v| m.min(v));
-            let high = at.iter().fold(i64::MIN, |m, &v| m.max(v));
-            if high + last * (right.max(0) + down.max(0)) < 0 {
+            let first = i64::from(x) * edge.right + i64::from(y) * edge.down;
+            let (mut low, mut high) = (i64::MAX, i64::MIN);
+            for at in &mut edge.at {
+                *at += first;
+                (low, high) = (low.min(*at), high.max(*at));
+            }
+            if high + last * (edge.right.max(0) + edge.down.max(0)) < 0 {
                 return None;
             }
-            *edge = match low + last * (right.min(0) + down.min(0)) >= 0 {
-                true => Edge {
+            if low + last * (edge.right.min(0) + edge.down.min(0)) >= 0 {
+                *edge = Edge {
                     at: [0; N],
                     right: 0,
                     down: 0,
-                },
-                false => Edge { at, ..*edge },
-            };
+                };
+            }
         }
         Some(crossing)
     }
@@ -128,21 +146,22 @@ impl Edges<1> {
             return each::<TILE, 1>(&edges);
         }
         let lanes = |e: &Edge<1>, from: i32| {
-            let first = (e.at[0] + i64::from(rows[0]) * e.down) as i32;
-            let right = e.right as i32;
-            i32x4::new([0, 1, 2, 3].map(|x| first + (from + x) * right))
+            let r = e.right as i32;
+            let first = (e.at[0] + i64::from(rows[0]) * e.down) as i32 + from * r;
+            i32x4::new([first, first + r, first + 2 * r, first + 3 * r])
         };
-        let mut left = edges.each_ref().map(|e| lanes(e, 0));
-        let mut right = edges.each_ref().map(|e| lanes(e, 4));
-        let down = edges.map(|e| i32x4::splat(e.down as i32));
+        let [a, b, c] = &edges;
+        let mut left = [lanes(a, 0), lanes(b, 0), lanes(c, 0)];
+        let mut right = [lanes(a, 4), lanes(b, 4), lanes(c, 4)];
+        let down = [a, b, c].map(|e| i32x4::splat(e.down as i32));
         let mut inside = 0;
         for y in rows[0]..rows[1] {
             let outside = |v: &[i32x4; 3]| (v[0] | v[1] | v[2]).to_bitmask();
             let row = outside(&left) | outside(&right) << 4;
             inside |= u64::from(!row & 0xff) << (TILE * y);
-            for (edge, down) in down.into_iter().enumerate() {
-                left[edge] += down;
-                right[edge] += down;
+            for edge in 0..3 {
+                left[edge] += down[edge];
+                right[edge] += down[edge];
             }
         }
         inside
@@ -196,9 +215,8 @@ fn each<const SIDE: i32, const N: usize>(edges: &[Edge<N>; 3]) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::space::raster::camera::Corner;
     use crate::space::raster::pane::Pane;
-    use crate::space::raster::triangle::CENTER;
+    use crate::space::raster::triangle::{CENTER, reach};
 
     /// Places as four samples of a pixel have them.
     const FOUR: [[i32; 2]; 4] = [[96, 32], [224, 96], [32, 160], [160, 224]];
@@ -250,7 +268,8 @@ mod tests {
         for (case, triangle) in triangles().enumerate() {
             let edges = Edges::new(&triangle, places);
             let mut found = vec![0u64; (64 / side * 64 / side) as usize];
-            if let Some(reached) = triangle.reach_at(&pane, places) {
+            let corners = triangle.sides().map(|(from, _)| *from);
+            if let Some(reached) = reach(&corners, &pane, places) {
                 each_tile(reached, side, |reached| {
                     let [x, y] = reached.tile;
                     found[(y * (64 / side) + x) as usize] = inside(&edges, reached);

@@ -10,7 +10,7 @@ use super::camera::Corner;
 use super::draw::EMPTY;
 use super::edges::{Edges, Reached, TILE, each_tile};
 use super::pane::Pane;
-use super::seen::{Seen, seen};
+use super::seen::{Seen, may_reach, seen};
 use super::triangle::{CENTER, Plane};
 use super::{Sampling, Scene};
 
@@ -66,7 +66,8 @@ impl Tile {
     #[inline]
     fn nearer(&self, samples: u64, depth: &Plane, first: [i32; 2]) -> u64 {
         let mut nearer = 0;
-        let four = |x: i32| f32x4::new([0, 1, 2, 3].map(|i| depth.across(first[0] + x + i)));
+        let across = |x: i32| depth.across(first[0] + x);
+        let four = |x: i32| f32x4::new([across(x), across(x + 1), across(x + 2), across(x + 3)]);
         let columns = [four(0), four(4)];
         let (rows, _) = self.near.as_chunks::<8>();
         for (y, row) in (0..).zip(rows) {
@@ -111,8 +112,11 @@ impl Front {
         self.tiles.clear();
         self.tiles.resize(across * down, Tile::NOTHING);
         for (place, &id) in (0..).zip(ids) {
+            let Some(reached) = may_reach(scene, corners, id, pane, CENTER) else {
+                continue;
+            };
             if let Some(shown) = seen(scene, corners, id) {
-                self.add(&shown, scene, sampling, pane, place);
+                self.add(&shown, reached, scene, sampling, pane, place);
             }
         }
     }
@@ -127,10 +131,15 @@ impl Front {
         (tile.items[sample], tile.near[sample])
     }
 
-    fn add(&mut self, shown: &Seen, scene: &Scene, sampling: Sampling, pane: &Pane, place: u32) {
-        let Some([xs, ys]) = shown.triangle.reach(pane) else {
-            return;
-        };
+    fn add(
+        &mut self,
+        shown: &Seen,
+        [xs, ys]: [[i32; 2]; 2],
+        scene: &Scene,
+        sampling: Sampling,
+        pane: &Pane,
+        place: u32,
+    ) {
         let nears = shown.corners.iter().map(|c| c.near);
         let nearest = nears.fold(f32::MIN, f32::max);
         let plane = || shown.triangle.near_plane(shown.corners);

@@ -6,9 +6,9 @@
 
 use super::camera::SUBSAMPLES;
 use super::coverage::Coverage;
-use super::edges::{Edges, PIXELS, Reached, each_tile};
+use super::edges::{Edges, PIXELS, Reached, each_tile, lone};
 use super::pane::Pane;
-use super::seen::{Seen, hitting};
+use super::seen::{Seen, may_reach, seen};
 use super::{Camera, Mips, Sampling, Scene};
 
 /// The standard places of four samples, in 16ths of a pixel from its corner (Vulkan 1.3, 26.4
@@ -62,21 +62,33 @@ impl Multisampled {
     pub fn draw(&mut self, scene: &Scene, camera: &Camera) {
         let corners = camera.project(scene.geometry.positions, SHADING.side);
         let places = PLACES.map(|(x, y)| [x, y].map(|p| p * SUBSAMPLES / 16));
-        for shown in hitting(scene, &corners, places) {
-            self.add(&shown, scene, places);
+        let whole = Pane::of([self.width, self.height].map(|s| s as i32));
+        for id in 0..scene.geometry.triangles.len() as u32 {
+            let Some(reached) = may_reach(scene, &corners, id, &whole, places) else {
+                continue;
+            };
+            // Most triangles of a crown lie within one tile, and that is full.
+            if lone(reached, PIXELS).is_some_and(|tile| self.tiles[self.number(tile)] == !0) {
+                continue;
+            }
+            if let Some(shown) = seen(scene, &corners, id) {
+                self.add(&shown, reached, scene, places);
+            }
         }
     }
 
-    fn add(&mut self, shown: &Seen, scene: &Scene, places: [[i32; 2]; 4]) {
-        let whole = Pane::of([self.width, self.height].map(|s| s as i32));
-        let Some(reached) = shown.triangle.reach_at(&whole, places) else {
-            return;
-        };
-        let across = self.width.div_ceil(PIXELS as u32) as i32;
+    /// The place of a tile among all.
+    fn number(&self, [x, y]: [i32; 2]) -> usize {
+        y as usize * self.width.div_ceil(PIXELS as u32) as usize + x as usize
+    }
+
+    #[inline]
+    fn add(&mut self, shown: &Seen, reached: [[i32; 2]; 2], scene: &Scene, places: [[i32; 2]; 4]) {
         let (mut edges, mut fragment) = (None, None);
         each_tile(reached, PIXELS, |Reached { tile, xs, ys }| {
             let first = tile.map(|t| t * PIXELS);
-            let hits = &mut self.tiles[(tile[1] * across + tile[0]) as usize];
+            let number = self.number(tile);
+            let hits = &mut self.tiles[number];
             // Inside a crown most tiles are full: edges are not even looked at.
             if *hits == !0 {
                 return;

@@ -35,10 +35,9 @@ impl Patch<'_> {
     /// Calls `found` with each of the `open` samples and its place, as [`Level::place`] gives it.
     #[inline]
     pub fn each(&self, open: u64, mut found: impl FnMut(u32, [i32; 2], [u32; 2])) {
-        let columns = [0, 4].map(|from| {
-            let x = [0, 1, 2, 3].map(|x| (self.first[0] + from + x) as f32);
-            f32x4::new(x.map(|x| x - self.uv[0].x0()))
-        });
+        let column = |x: i32| (self.first[0] + x) as f32 - self.uv[0].x0();
+        let four = |x: i32| f32x4::new([column(x), column(x + 1), column(x + 2), column(x + 3)]);
+        let columns = [four(0), four(4)];
         for y in open.trailing_zeros() / 8..8 - open.leading_zeros() / 8 {
             let mut row = (open >> (8 * y)) as u8;
             if row == 0 {

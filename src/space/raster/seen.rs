@@ -2,7 +2,8 @@
 
 use super::camera::Corner;
 use super::fragment::Fragment;
-use super::triangle::{Triangle, may_hit};
+use super::pane::Pane;
+use super::triangle::{Triangle, may_hit, reach};
 use super::{Material, Sampling, Scene};
 
 /// What drawing needs of one triangle.
@@ -28,20 +29,21 @@ pub(super) fn seen<'s>(scene: &'s Scene<'s>, corners: &[Corner], id: u32) -> Opt
     })
 }
 
-/// The triangles that may hit a sample at one of `places` and are seen, in order.
-pub(super) fn hitting<'s, const N: usize>(
-    scene: &'s Scene<'s>,
-    corners: &'s [Corner],
+/// The first and last column, and row, of a pane in which a triangle may hit a sample at one of
+/// `places` of a pixel, if there are any.
+#[inline]
+pub(super) fn may_reach<const N: usize>(
+    scene: &Scene,
+    corners: &[Corner],
+    id: u32,
+    pane: &Pane,
     places: [[i32; 2]; N],
-) -> impl Iterator<Item = Seen<'s>> {
-    let all = (0..).zip(scene.geometry.triangles);
-    all.filter_map(move |(id, indices)| {
-        let at = indices.map(|i| corners[i as usize]);
-        match may_hit(&at, places) {
-            true => seen(scene, corners, id),
-            false => None,
-        }
-    })
+) -> Option<[[i32; 2]; 2]> {
+    let at = scene.geometry.triangles[id as usize].map(|i| corners[i as usize]);
+    // With one sample a pixel the reach itself tells.
+    (N == 1 || may_hit(&at, places))
+        .then(|| reach(&at, pane, places))
+        .flatten()
 }
 
 impl<'s> Seen<'s> {

@@ -131,21 +131,6 @@ impl Triangle {
     pub fn near_plane(&self, corners: [Corner; 3]) -> Plane {
         self.plane(corners.map(|c| c.near))
     }
-
-    /// The first and last column, and row, of a pane that may have samples inside, if any.
-    pub fn reach(&self, pane: &Pane) -> Option<[[i32; 2]; 2]> {
-        self.reach_at(pane, CENTER)
-    }
-
-    /// As [`Self::reach`], of pixels with samples at several places, in sub-samples from their left
-    /// upper corners.
-    pub fn reach_at<const N: usize>(
-        &self,
-        pane: &Pane,
-        places: [[i32; 2]; N],
-    ) -> Option<[[i32; 2]; 2]> {
-        reach(&self.corners, pane, places)
-    }
 }
 
 /// The first and last column, and row, of a pane that may have samples inside; `None` where none
