@@ -58,7 +58,7 @@ fn mean_color(texels: &[Texel]) -> Option<Vec3> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use glam::Vec2;
 
     use super::*;
@@ -70,7 +70,7 @@ mod tests {
 
     /// A right triangle: red in front, and green behind where `backs` says so, else the same sheet from
     /// both sides.
-    fn leaf(backs: bool) -> (Model, CardGroup) {
+    pub(crate) fn leaf(backs: bool) -> (Model, CardGroup) {
         let corners = [Vec3::ZERO, Vec3::X, Vec3::Y];
         let material = |color: [f32; 4]| Material {
             base_color_factor: color,

@@ -1,6 +1,7 @@
 //! Cards whose sides differ visibly are drawn once for each side, within the level's budget.
 
 use super::Baker;
+use crate::botany::model::Model;
 use crate::detail::level::LevelPlan;
 use crate::export::foliage::CardGroup;
 use crate::export::sides::{VISIBLE_DELTA_E, differences};
@@ -28,7 +29,7 @@ impl Baker<'_> {
         if !self.recipe.second_sides || self.recipe.sharing > 0.0 {
             return Some(plan);
         }
-        let mut sided = self.differing(&plan);
+        let mut sided = differing(&self.tree.model, &plan);
         for _ in 0..TRIES {
             let (own, more) = (self.cost(&plan), triangles_of(&plan, &sided));
             if own + more <= budget {
@@ -38,7 +39,7 @@ impl Baker<'_> {
                 break;
             };
             plan = coarser;
-            sided = self.differing(&plan);
+            sided = differing(&self.tree.model, &plan);
         }
         let mut left = budget.saturating_sub(self.cost(&plan));
         sided.retain(|&card| {
@@ -49,39 +50,6 @@ impl Baker<'_> {
         });
         plan.sided = sided;
         Some(plan)
-    }
-
-    /// Cards whose sides differ visibly; none where that is little of them all, or of those asked first.
-    fn differing(&self, plan: &LevelPlan) -> Vec<u32> {
-        let all = 0..plan.cards.len() as u32;
-        let every = (plan.cards.len() / ASKED_FIRST).max(1);
-        if every > 1 {
-            let some: Vec<u32> = all.clone().step_by(every).collect();
-            if self.of_these(plan, &some).1 < LEAST_SHARE / 2.0 {
-                return Vec::new();
-            }
-        }
-        match self.of_these(plan, &all.collect::<Vec<u32>>()) {
-            (differing, share) if share >= LEAST_SHARE => differing,
-            _ => Vec::new(),
-        }
-    }
-
-    /// Those of some cards whose sides differ visibly, and their share of the area of these.
-    fn of_these(&self, plan: &LevelPlan, cards: &[u32]) -> (Vec<u32>, f64) {
-        let groups: Vec<&CardGroup> = cards.iter().map(|&c| &plan.cards[c as usize]).collect();
-        let found = differences(&self.tree.model, &groups);
-        let areas = groups.iter().map(|g| f64::from(g.card.area()));
-        let all: f64 = areas.clone().sum();
-        let mut differing = Vec::new();
-        let mut sum = 0.0;
-        for ((&card, area), difference) in cards.iter().zip(areas).zip(found) {
-            if difference >= VISIBLE_DELTA_E {
-                differing.push(card);
-                sum += area;
-            }
-        }
-        (differing, sum / all.max(f64::MIN_POSITIVE))
     }
 
     /// Triangles of a plan.
@@ -96,7 +64,66 @@ impl Baker<'_> {
     }
 }
 
+/// Cards whose sides differ visibly; none where that is little of them all, or of those asked first.
+fn differing(model: &Model, plan: &LevelPlan) -> Vec<u32> {
+    let all = 0..plan.cards.len() as u32;
+    let every = (plan.cards.len() / ASKED_FIRST).max(1);
+    if every > 1 {
+        let some: Vec<u32> = all.clone().step_by(every).collect();
+        if of_these(model, plan, &some).1 < LEAST_SHARE / 2.0 {
+            return Vec::new();
+        }
+    }
+    match of_these(model, plan, &all.collect::<Vec<u32>>()) {
+        (differing, share) if share >= LEAST_SHARE => differing,
+        _ => Vec::new(),
+    }
+}
+
+/// Those of some cards whose sides differ visibly, and their share of the area of these.
+fn of_these(model: &Model, plan: &LevelPlan, cards: &[u32]) -> (Vec<u32>, f64) {
+    let groups: Vec<&CardGroup> = cards.iter().map(|&c| &plan.cards[c as usize]).collect();
+    let found = differences(model, &groups);
+    let areas = groups.iter().map(|g| f64::from(g.card.area()));
+    let all: f64 = areas.clone().sum();
+    let mut differing = Vec::new();
+    let mut sum = 0.0;
+    for ((&card, area), difference) in cards.iter().zip(areas).zip(found) {
+        if difference >= VISIBLE_DELTA_E {
+            differing.push(card);
+            sum += area;
+        }
+    }
+    (differing, sum / all.max(f64::MIN_POSITIVE))
+}
+
 fn triangles_of(plan: &LevelPlan, cards: &[u32]) -> u64 {
     let cost = |&card: &u32| plan.cards[card as usize].card.triangles() as u64;
     cards.iter().map(cost).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::export::sides::tests::leaf;
+
+    #[test]
+    fn sides_differ_where_a_share_of_all_cards_says_so() {
+        let (model, two) = leaf(true);
+        // One sheet: the front alone, which the model draws from both sides.
+        let one = CardGroup {
+            triangles: vec![0, 0],
+            ..two.clone()
+        };
+        let plan = |is_two: fn(u32) -> bool| LevelPlan {
+            cards: (0..1500)
+                .map(|card| if is_two(card) { &two } else { &one }.clone())
+                .collect(),
+            ..LevelPlan::default()
+        };
+        let found = differing(&model, &plan(|card| card >= 1000));
+        assert_eq!(found, (1000..1500).collect::<Vec<u32>>());
+        assert_eq!(differing(&model, &plan(|card| card % 50 == 0)), [0; 0]);
+        assert_eq!(differing(&model, &plan(|_| true)).len(), 1500);
+    }
 }
