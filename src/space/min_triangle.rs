@@ -15,6 +15,9 @@ use super::hull::{Rect2, cross, meet, min_rect, shrink, thick};
 /// search takes the cube of it. On random hulls it costs less than a percent of area.
 const TRIANGLE_SEARCH_CORNERS: usize = 16;
 
+/// Less than one by more than what hulls may stick out of a triangle and still count as held.
+const CERTAIN: f64 = 1.0 - 1e-4;
+
 /// The smallest triangle around a hull, counter-clockwise (see the head of this file; hulls with
 /// more than 16 corners are simplified first, so the answer is then near the smallest). Degenerate
 /// hulls get a thin triangle. The area is at most twice the hull's.
@@ -73,6 +76,17 @@ impl Smallest<'_> {
         let Some(apex) = meet(pi, di, pj, dj) else {
             return;
         };
+        // A point that lies s and t along the sides, seen from the apex, is within sides of lengths a and b
+        // only where s/a + t/b <= 1, and then a b >= 4 s t: most pairs are passed over by that.
+        let turn = cross(di, dj);
+        let least = |q: &DVec2| -4.0 * cross(*q - apex, dj) * cross(di, *q - apex) / turn;
+        let least = self.hull.iter().map(least).fold(0.0, f64::max);
+        if self
+            .found
+            .is_some_and(|(found, _)| least * CERTAIN >= found)
+        {
+            return;
+        }
         for (number, k) in sides.iter().enumerate() {
             self.close(apex, both, number, k.along);
             // The side whose midpoint is p: from a on line j to b on line i with a + b = 2 p.
