@@ -120,7 +120,7 @@ impl Content<'_> {
                         @for section in &sections { (section) }
                         p class="quiet" {
                             "Made by pleach " (env!("CARGO_PKG_VERSION"))
-                            ". Drawn with 16 samples a pixel, lit by sky and sun, before a ground of half of white's light."
+                            ". Drawn with 16 samples a pixel (four neighbours that show one triangle are lit as one), lit by sky and sun, before a ground of half of white's light."
                         }
                     }
                     script { (PreEscaped(SCRIPT)) }

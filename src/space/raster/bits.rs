@@ -14,17 +14,23 @@ pub(super) struct BitTiles {
 impl BitTiles {
     /// From one byte a sample, 0 or 1, rows of `size[0]`.
     pub fn new(samples: &[u8], size: [i32; 2]) -> Self {
+        let mut tiles = Self::empty(size);
+        tiles.each_row(|word, shift, at| {
+            for (x, &hit) in samples[at].iter().enumerate() {
+                *word |= u64::from(hit) << (shift + x);
+            }
+        });
+        tiles
+    }
+
+    /// A picture of nothing.
+    pub fn empty(size: [i32; 2]) -> Self {
         let [across, down] = size.map(|s| (s + TILE - 1) / TILE);
         let mut tiles = Self {
             size,
             across,
             words: vec![0; across as usize * down as usize],
         };
-        tiles.each_row(|word, shift, at| {
-            for (x, &hit) in samples[at].iter().enumerate() {
-                *word |= u64::from(hit) << (shift + x);
-            }
-        });
         for y in 0..down {
             for x in 0..across {
                 let outside = tiles.outside([x, y]);

@@ -173,7 +173,8 @@ impl Camera {
         if self.perspective {
             inside &= z.simd_ge(splat(NEAR)).to_bitmask();
         }
-        let [xs, ys] = [nearest(x), nearest(y)].map(i32x4::to_array);
+        // Half up, as graphics processors do.
+        let [xs, ys] = [x, y].map(|at| floor(at + f32x4::HALF).to_array());
         let [nears, qs] = [near, q].map(f32x4::to_array);
         let mut corners = [Corner::OUTSIDE; 4];
         for (i, corner) in corners.iter_mut().enumerate() {
@@ -190,10 +191,9 @@ impl Camera {
     }
 }
 
-/// Rounds half up; what lies beyond [`LIMIT`] has no answer.
+/// Rounds down; what lies beyond 32 bits has no answer.
 #[inline]
-fn nearest(value: f32x4) -> i32x4 {
-    let value = value + f32x4::HALF;
+pub(super) fn floor(value: f32x4) -> i32x4 {
     let whole = value.fast_trunc_int();
     let above = f32x4::from_i32x4(whole).simd_gt(value) & f32x4::ONE;
     whole - above.fast_trunc_int()

@@ -1,7 +1,7 @@
 //! Which samples a scene hits: alpha without colour or depth, the fast path.
 
 use super::bits::BitTiles;
-use super::edges::{Edges, Reached, TILE, each_tile, lone};
+use super::edges::{Edges, Reached, TILE, each_tile, only_tile};
 use super::seen::{Seen, may_reach, seen};
 use super::triangle::CENTER;
 use super::{Camera, Mips, Sampling, Scene};
@@ -42,14 +42,16 @@ pub struct Stats {
 /// Draws where the scene is.
 pub fn coverage(scene: &Scene, camera: &Camera, sampling: Sampling) -> Mask {
     let mut mask = Mask::empty(camera, sampling.side);
-    mask.draw(scene, camera, sampling.mips);
+    let picture = BitTiles::empty(mask.size());
+    mask.add::<false>(picture, scene, camera, sampling.mips);
     mask
 }
 
 /// As [`coverage`], with the number of fragments.
 pub fn coverage_with_stats(scene: &Scene, camera: &Camera, sampling: Sampling) -> (Mask, Stats) {
     let mut mask = Mask::empty(camera, sampling.side);
-    let fragments = mask.add::<true>(scene, camera, sampling.mips);
+    let picture = BitTiles::empty(mask.size());
+    let fragments = mask.add::<true>(picture, scene, camera, sampling.mips);
     let covered = mask.samples.iter().map(|&s| s as u64).sum();
     (mask, Stats { fragments, covered })
 }
@@ -68,16 +70,26 @@ impl Mask {
 
     /// Adds what a scene covers, seen by a camera of the same size.
     pub fn draw(&mut self, scene: &Scene, camera: &Camera, mips: Mips) {
-        self.add::<false>(scene, camera, mips);
+        let picture = BitTiles::new(&self.samples, self.size());
+        self.add::<false>(picture, scene, camera, mips);
     }
 
-    /// As [`Mask::draw`]; returns the samples inside triangles that face the eye, if they are counted.
-    fn add<const COUNTED: bool>(&mut self, scene: &Scene, camera: &Camera, mips: Mips) -> u64 {
+    /// Columns and rows of samples.
+    fn size(&self) -> [i32; 2] {
+        [self.width, self.height].map(|pixels| (pixels * self.side) as i32)
+    }
+
+    /// As [`Mask::draw`], over a picture of what is hit already; returns the samples inside triangles that face the eye, if they are counted.
+    fn add<const COUNTED: bool>(
+        &mut self,
+        mut picture: BitTiles,
+        scene: &Scene,
+        camera: &Camera,
+        mips: Mips,
+    ) -> u64 {
         let side = self.side;
         let sampling = Sampling { side, mips };
         let corners = camera.project(scene.geometry.positions, side);
-        let size = [self.width * side, self.height * side].map(|s| s as i32);
-        let mut picture = BitTiles::new(&self.samples, size);
         let whole = picture.whole();
         let mut fragments = 0;
         for id in 0..scene.geometry.triangles.len() as u32 {
@@ -85,7 +97,7 @@ impl Mask {
                 continue;
             };
             // Most triangles of a crown lie within one tile, and that is full.
-            if !COUNTED && lone(reached, TILE).is_some_and(|tile| *picture.at(tile) == !0) {
+            if !COUNTED && only_tile(reached, TILE).is_some_and(|tile| *picture.at(tile) == !0) {
                 continue;
             }
             if let Some(shown) = seen(scene, &corners, id) {

@@ -28,7 +28,7 @@ pub(super) struct Reached {
 
 /// The tile that holds all that is reached, if one does.
 #[inline]
-pub(super) fn lone([xs, ys]: [[i32; 2]; 2], side: i32) -> Option<[i32; 2]> {
+pub(super) fn only_tile([xs, ys]: [[i32; 2]; 2], side: i32) -> Option<[i32; 2]> {
     let tiles = [xs, ys].map(|ends| ends.map(|at| at / side));
     let [[x, last_x], [y, last_y]] = tiles;
     (x == last_x && y == last_y).then_some([x, y])

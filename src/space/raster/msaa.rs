@@ -6,7 +6,7 @@
 
 use super::camera::SUBSAMPLES;
 use super::coverage::Coverage;
-use super::edges::{Edges, PIXELS, Reached, each_tile, lone};
+use super::edges::{Edges, PIXELS, Reached, each_tile, only_tile};
 use super::pane::Pane;
 use super::seen::{Seen, may_reach, seen};
 use super::{Camera, Mips, Sampling, Scene};
@@ -68,7 +68,7 @@ impl Multisampled {
                 continue;
             };
             // Most triangles of a crown lie within one tile, and that is full.
-            if lone(reached, PIXELS).is_some_and(|tile| self.tiles[self.number(tile)] == !0) {
+            if only_tile(reached, PIXELS).is_some_and(|tile| self.tiles[self.number(tile)] == !0) {
                 continue;
             }
             if let Some(shown) = seen(scene, &corners, id) {

@@ -2,6 +2,7 @@
 
 use wide::{f32x4, i32x4};
 
+use super::camera::floor;
 use super::texture::{Address, Level};
 use super::triangle::Plane;
 
@@ -79,9 +80,7 @@ impl Patch<'_> {
     fn rounded(&self, at: f32x4) -> i32x4 {
         // Kept far from the ends of i32: neighbours of any texel can be counted.
         let at = at.fast_max(f32x4::splat(-1e9)).fast_min(f32x4::splat(1e9));
-        let whole = at.fast_trunc_int();
-        let above = f32x4::from_i32x4(whole).simd_gt(at) & f32x4::ONE;
-        let down = whole - above.fast_trunc_int();
+        let down = floor(at);
         match self.address.linear {
             true => down,
             // To the middle of the texel that holds the point: its neighbours weigh nothing.

@@ -84,16 +84,16 @@ impl<'a> Shader<'a> {
         let side = self.sampling.side as usize;
         // Which samples are shaded: all of 4 x 4, as many of more.
         let stride = (side / SHADED).max(1);
-        let chosen = |size: usize, stride_of: usize| (stride / 2..size).step_by(stride_of);
+        let chosen = |size: usize, step: usize| (stride / 2..size).step_by(step);
         // Four neighbours are shaded as one where that leaves 2 x 2 or more of a pixel.
-        let step = match side / stride == SHADED && side.is_multiple_of(SHADED) {
+        let step = match side == SHADED * stride {
             true => 2 * stride,
             false => stride,
         };
         for y in chosen(pane.height(), step) {
             for x in chosen(pane.width(), step) {
                 match step > stride {
-                    true => self.four(front, pane, ids, [x, y], stride, &mut add),
+                    true => self.shade_four(front, pane, ids, [x, y], stride, &mut add),
                     false => self.sample(front, pane, ids, [x, y], &mut add),
                 }
             }
@@ -122,7 +122,7 @@ impl<'a> Shader<'a> {
 
     /// Shades four samples `stride` apart, given as column and row of the first in the pane: once in
     /// their middle where one triangle is seen at all of them.
-    fn four(
+    fn shade_four(
         &mut self,
         front: &Front,
         pane: &Pane,
