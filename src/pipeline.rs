@@ -187,7 +187,7 @@ fn levels(
     ranges: &[Range],
     watch: &dyn Watch,
 ) -> Result<Made> {
-    let pieces = Pieces::new(tree, &request.recipe, watch)?;
+    let pieces = Pieces::new(tree, &request.recipe, &request.scene, watch)?;
     let baker = pieces.baker(&request.recipe);
     begin(watch, "describe", 1)?;
     let mut levels = Levels::new(request, tree, &pieces.elements, ranges);
@@ -268,6 +268,7 @@ pub fn lens(scene: &Scene) -> Lens {
 pub fn settings(scene: &Scene) -> Settings {
     Settings {
         azimuth_offset_deg: REPORT_OFFSET_DEG,
+        sector: scene.sector(),
         lens: lens(scene),
         ..Settings::default()
     }

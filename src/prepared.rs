@@ -15,6 +15,7 @@ use crate::level::{Baker, MASK_HEIGHT};
 use crate::provenance::{check_name, provenance};
 use crate::recipe::{Method, Recipe};
 use crate::request::Request;
+use crate::scene::Scene;
 use crate::watch::{Watch, begin};
 
 /// A tree that was recognised, and which levels it gets.
@@ -42,8 +43,11 @@ impl Prepared {
         let limits = &request.recipe.limits;
         let input = read(&request.input, limits)?;
         let provenance = provenance(request, &input)?;
-        let model = load_slice(&input, &request.input, limits)?;
+        let mut model = load_slice(&input, &request.input, limits)?;
         drop(input);
+        if !request.scene.lit {
+            model.unlight();
+        }
         let least = match request.recipe.method {
             Method::CrossedQuads => 4,
             _ => LEAST_TRIANGLES,
@@ -79,14 +83,19 @@ impl<'t> Pieces<'t> {
     ///
     /// # Errors
     /// [`Error::Interrupted`](crate::error::Error::Interrupted).
-    pub fn new(tree: &'t Tree, recipe: &Recipe, watch: &dyn Watch) -> Result<Self> {
+    pub fn new(tree: &'t Tree, recipe: &Recipe, scene: &Scene, watch: &dyn Watch) -> Result<Self> {
         begin(watch, "group", 1)?;
         let elements = elements(tree);
         let hierarchy = merge(&elements, recipe.locality);
         let wood = Wood::new(tree, true);
         begin(watch, "look", 1)?;
         Ok(Self {
-            original: Original::new(&tree.model, recipe.training_views, MASK_HEIGHT),
+            original: Original::new(
+                &tree.model,
+                recipe.training_views,
+                scene.sector(),
+                MASK_HEIGHT,
+            ),
             tree,
             elements,
             hierarchy,

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::knobs::{Knobs, Range};
+use crate::space::sector::Sector;
 
 /// Scenes to start from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
@@ -43,6 +44,15 @@ pub struct Scene {
     /// Farthest that a tree is drawn, metres; default 0: no end. Levels that start behind are not
     /// baked.
     pub farthest_m: f64,
+    /// Azimuths from which trees are seen, from and to, degrees around y, at most 360 apart: 0 looks from +z, 90
+    /// from +x; default (0, 360): from all around. Levels are fitted and judged from there alone, and the sides of
+    /// cards that are never seen get no texels.
+    pub azimuths_deg: [f32; 2],
+    /// Elevations from which trees are seen, from and to, degrees above the horizon; default (-90, 90).
+    pub elevations_deg: [f32; 2],
+    /// Whether light falls on trees; default true. Otherwise levels have base colours alone
+    /// (KHR_materials_unlit), and no maps that only light shows are made.
+    pub lit: bool,
     /// Levels fade into each other between their distance and this many times that, 1 to 2;
     /// default 1.1.
     pub fade: f64,
@@ -59,6 +69,9 @@ impl Default for Scene {
             vanish_height_px: 0.0,
             nearest_m: 0.0,
             farthest_m: 0.0,
+            azimuths_deg: Sector::default().azimuths_deg,
+            elevations_deg: Sector::default().elevations_deg,
+            lit: true,
             fade: 1.1,
         }
     }
@@ -87,6 +100,12 @@ impl Knobs for Scene {
                 1e12,
             ),
         ];
+        let [from, to] = self.azimuths_deg.map(f64::from);
+        out.push(Range::of("azimuths_deg", from, -360.0, 360.0));
+        out.push(Range::of("azimuths_deg", to, from, from + 360.0));
+        let [low, high] = self.elevations_deg.map(f64::from);
+        out.push(Range::of("elevations_deg", low, -90.0, 90.0));
+        out.push(Range::of("elevations_deg", high, low, 90.0));
         let mut nearer = 16384.0;
         for &height in &self.heights_px {
             out.push(Range::of("heights_px", height, 4.0, nearer));
@@ -97,6 +116,14 @@ impl Knobs for Scene {
 }
 
 impl Scene {
+    /// The directions from which trees are seen.
+    pub fn sector(&self) -> Sector {
+        Sector {
+            azimuths_deg: self.azimuths_deg,
+            elevations_deg: self.elevations_deg,
+        }
+    }
+
     /// The scene of a preset.
     pub fn preset(preset: ScenePreset) -> Self {
         let game = Self::default();

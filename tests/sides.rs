@@ -8,6 +8,7 @@ use pleach::botany::model::Image;
 use pleach::export::manifest::{Level, Manifest};
 use pleach::pipeline::{Limit, Request, Wanted, bake};
 use pleach::recipe::Recipe;
+use pleach::scene::Scene;
 use pleach::space::glb::GlbBuilder;
 use pleach::watch::Unwatched;
 use serde_json::json;
@@ -82,6 +83,10 @@ fn two_toned(file: &Path) {
 
 /// The level's cards and the page that they show.
 fn baked(folder: &Path, second_sides: bool) -> (Level, Image) {
+    baked_for(folder, second_sides, Scene::default())
+}
+
+fn baked_for(folder: &Path, second_sides: bool, scene: Scene) -> (Level, Image) {
     let input = folder.join("tree.glb");
     two_toned(&input);
     let output = folder.join("package");
@@ -95,6 +100,7 @@ fn baked(folder: &Path, second_sides: bool) -> (Level, Image) {
             triangular_cards: false,
             ..Recipe::draft()
         },
+        scene,
         force: true,
         accept: true,
         ..Request::default()
@@ -168,4 +174,34 @@ fn without_second_sides_cards_have_one_texture_and_are_more() {
     assert!(level.cards.iter().all(|card| card.back.is_none()));
     let (sided, _) = baked(folder.path(), true);
     assert!(level.cards.len() > sided.cards.len());
+}
+
+#[test]
+fn a_side_that_the_scene_never_shows_gets_no_texels() {
+    let folder = tempfile::tempdir().unwrap();
+    for (elevations_deg, is_green) in [([35.0, 90.0], true), ([-90.0, -35.0], false)] {
+        let scene = Scene {
+            elevations_deg,
+            ..Scene::default()
+        };
+        let (level, page) = baked_for(folder.path(), true, scene);
+        let mut seen = 0;
+        for card in &level.cards {
+            let up = looks_up(&card.corners);
+            if up.abs() < 0.8 {
+                continue;
+            }
+            assert!(card.back.is_none());
+            // The front of such a card is the side that the camera sees.
+            assert_eq!(up > 0.0, is_green);
+            let [red, green] = red_and_green(&page, card.atlas).unwrap();
+            assert_eq!(green > red, is_green, "{red:.0} {green:.0}");
+            seen += 1;
+        }
+        assert!(
+            seen * 2 > level.cards.len(),
+            "{seen} of {}",
+            level.cards.len()
+        );
+    }
 }

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::LazyLock;
 
+use pleach::batch::is_unchanged;
 use pleach::botany::grow::{Options, Species as Kind, grow};
 use pleach::botany::load::load;
 use pleach::botany::model::{AlphaMode, Image};
@@ -12,7 +13,7 @@ use pleach::export::manifest::{Manifest, SUFFIX};
 use pleach::pipeline::{Request, Wanted, bake};
 use pleach::recipe::Recipe;
 use pleach::scene::Scene;
-use pleach::species::{BakedSpecies, Species, bake_species};
+use pleach::species::{BakedSpecies, Species, bake_species, standing};
 use pleach::threads::pool;
 use pleach::watch::Unwatched;
 use serde_json::Value;
@@ -64,6 +65,7 @@ fn baked(folder: &Path, sharing: f64, threads: usize) -> BakedSpecies {
     let species = Species {
         inputs: trees(folder),
         request: request(folder.join(SPECIES), sharing),
+        ..Species::default()
     };
     let pool = pool(threads).unwrap();
     pool.install(|| bake_species(&species, &Unwatched)).unwrap()
@@ -280,6 +282,59 @@ fn the_same_bytes_on_one_thread_and_on_two() {
         let read = |home: &Path| std::fs::read(home.join(SPECIES).join(file)).unwrap();
         assert!(read(home.path()) == read(two.path()), "{file}");
     }
+}
+
+#[test]
+fn a_package_stands_while_trees_scene_and_files_are_what_they_were() {
+    let (home, all) = &*BAKED;
+    let mut species = Species {
+        inputs: NAMES.map(|n| home.path().join(format!("{n}.glb"))).into(),
+        request: request(home.path().join(SPECIES), MOST),
+        ..Species::default()
+    };
+    assert!(standing(&species).as_ref() == Some(&all.report));
+    species.request.recipe.memory_mib = 4096;
+    assert!(standing(&species).is_some());
+    let changed = |change: fn(&mut Species)| {
+        let mut other = species.clone();
+        change(&mut other);
+        standing(&other).is_none()
+    };
+    assert!(changed(|s| s.request.scene.fov_deg = 50.0));
+    assert!(changed(|s| s.request.recipe.sharing = 0.5));
+    assert!(changed(|s| s.request.wanted = Wanted::Levels(1)));
+    assert!(changed(|s| drop(s.inputs.pop())));
+    assert!(changed(|s| s.scenes = vec![Scene::default()]));
+    // A tree alone is another package.
+    assert!(!is_unchanged(&Request {
+        input: species.inputs[0].clone(),
+        ..species.request.clone()
+    }));
+    let lost = home.path().join(SPECIES).join("elm_LOD1.glb");
+    let aside = home.path().join("elm_LOD1.glb");
+    std::fs::rename(&lost, &aside).unwrap();
+    assert!(standing(&species).is_none());
+    std::fs::rename(&aside, &lost).unwrap();
+    assert!(standing(&species).is_some());
+}
+
+#[test]
+fn trees_that_do_not_fit_into_the_stated_memory_are_refused() {
+    let home = tempfile::tempdir().unwrap();
+    let mut species = Species {
+        inputs: trees(home.path()),
+        request: request(home.path().join("out"), MOST),
+        ..Species::default()
+    };
+    species.request.recipe.memory_mib = 100;
+    let error = bake_species(&species, &Unwatched).unwrap_err();
+    assert_eq!(error.exit_code(), 2);
+    let said = error.to_string();
+    assert!(
+        said.contains("memory_mib") && said.contains("these 3"),
+        "{said}"
+    );
+    assert!(!home.path().join("out").exists());
 }
 
 #[test]

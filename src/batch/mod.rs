@@ -20,7 +20,7 @@ use crate::recipe::Recipe;
 use crate::threads::pool;
 use crate::watch::{Quiet, Watch};
 pub use memory::{Gate, bytes_of_machine, expected_bytes};
-pub use unchanged::is_unchanged;
+pub use unchanged::{is_unchanged, unchanged};
 
 /// What to bake.
 #[derive(Clone, Debug, Default)]
@@ -109,7 +109,7 @@ pub fn bake_all(batch: &Batch, watch: &dyn Watch) -> Result<Vec<Outcome>> {
 
 /// Memory that trees may take together, bytes. A tree that is expected to take more is baked while
 /// no other is.
-fn memory_bytes(recipe: &Recipe) -> u64 {
+pub fn memory_bytes(recipe: &Recipe) -> u64 {
     match recipe.memory_mib {
         // Where the system does not tell: what any machine has that bakes trees.
         0 => bytes_of_machine().unwrap_or(8 << 30) / 2,

@@ -10,10 +10,12 @@ use crate::pipeline::{Request, provenance};
 /// from the same input (its external files too), levels, recipe and scene. Whatever can't be read
 /// counts as changed.
 pub fn is_unchanged(request: &Request) -> bool {
-    same(request).unwrap_or(false)
+    unchanged(request).is_some_and(|manifest| manifest.species.is_empty())
 }
 
-fn same(request: &Request) -> Option<bool> {
+/// What the package says of the request's tree, alone or as one of a species, where a bake would make
+/// the same.
+pub fn unchanged(request: &Request) -> Option<Manifest> {
     let mut name = request.input.file_stem()?.to_os_string();
     name.push(SUFFIX);
     let file: PathBuf = request.output.join(name);
@@ -22,10 +24,9 @@ fn same(request: &Request) -> Option<bool> {
     let manifest = Manifest::from_ron(&text, &file).ok()?;
     let there = |name: &String| request.output.join(name).is_file();
     let input = read(&request.input, &request.recipe.limits).ok()?;
-    Some(
-        manifest.recipe.bakes_like(&request.recipe)
-            && manifest.scene == request.scene
-            && manifest.provenance == provenance(request, &input).ok()?
-            && manifest.files.iter().all(there),
-    )
+    let same = manifest.recipe.bakes_like(&request.recipe)
+        && manifest.scene == request.scene
+        && manifest.provenance == provenance(request, &input).ok()?
+        && manifest.files.iter().all(there);
+    same.then_some(manifest)
 }

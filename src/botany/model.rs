@@ -217,6 +217,40 @@ impl Model {
             .retain(|_| numbers.next().is_some_and(&keep));
     }
 
+    /// Whether no light falls on it: all materials show their base colour as it is.
+    pub fn is_unlit(&self) -> bool {
+        !self.materials.is_empty() && self.materials.iter().all(|m| m.unlit)
+    }
+
+    /// Makes it one on which no light falls: what only light shows is forgotten.
+    pub fn unlight(&mut self) {
+        for material in &mut self.materials {
+            *material = Material {
+                metallic_roughness: None,
+                normal: None,
+                occlusion: None,
+                emissive_factor: [0.0; 3],
+                emissive: None,
+                unlit: true,
+                ..material.clone()
+            };
+        }
+        let mut numbers = vec![None; self.images.len()];
+        let mut kept = Vec::new();
+        for texture in self
+            .materials
+            .iter_mut()
+            .filter_map(|m| m.base_color.as_mut())
+        {
+            let old = texture.image as usize;
+            texture.image = *numbers[old].get_or_insert_with(|| {
+                kept.push(self.images[old].clone());
+                kept.len() as u32 - 1
+            });
+        }
+        self.images = kept;
+    }
+
     /// Forgets the pixels of images that are no base colour: enough to measure silhouettes and
     /// costs. Sizes stay.
     pub fn keep_only_base_colors(&mut self) {

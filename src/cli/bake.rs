@@ -33,13 +33,13 @@ pub struct Args {
     /// since the last run is not baked again.
     #[arg(long)]
     batch: bool,
-    /// In a batch: bake again what has not changed.
+    /// In a batch or a species: bake again what has not changed.
     #[arg(long)]
     rebake: bool,
     /// The inputs are trees of one species, which is named after DIR: one package, in which levels that start at one
     /// size share a page, and cards that look alike share texels, whosever they are (by --sharing, here .01 unless
     /// said otherwise).
-    #[arg(long, conflicts_with_all = ["batch", "rebake", "instancing", "hierarchy", "page"])]
+    #[arg(long, conflicts_with_all = ["batch", "instancing", "hierarchy", "page"])]
     species: bool,
     /// One level for each: a count ("5000") or a share of the original ("10%"), wood included.
     #[arg(long, value_delimiter = ',', value_name = "N|%", value_parser = limit)]
@@ -100,8 +100,10 @@ pub fn run(args: Args) -> Result<()> {
         let species = Species {
             inputs: args.inputs,
             request,
+            ..Species::default()
         };
-        return species::run(&species, args.threads.into(), args.quiet, args.json);
+        let threads = args.threads.into();
+        return species::run(&species, args.rebake, threads, args.quiet, args.json);
     }
     if args.batch || args.inputs.len() > 1 {
         if args.page {

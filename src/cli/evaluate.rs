@@ -93,6 +93,7 @@ pub fn run(args: &Args) -> Result<()> {
         lens,
         client: args.client,
         appearance: !args.silhouettes,
+        ..Settings::default()
     };
     let names: Vec<String> = files.iter().map(|file| file_name(file)).collect();
     let named: Vec<(&Model, &str)> = levels

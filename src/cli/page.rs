@@ -21,7 +21,10 @@ const HEIGHTS_PX: [u32; 2] = [256, 64];
 /// # Errors
 /// Those of loading the files, and [`Error::Io`].
 pub fn write(request: &Request, baked: &Baked, took: &Bake) -> Result<PathBuf> {
-    let original = load_with(&request.input, &request.recipe.limits)?;
+    let mut original = load_with(&request.input, &request.recipe.limits)?;
+    if !request.scene.lit {
+        original.unlight();
+    }
     let rows = &baked.report.levels;
     let levels: Vec<Model> = rows
         .iter()
@@ -35,6 +38,7 @@ pub fn write(request: &Request, baked: &Baked, took: &Bake) -> Result<PathBuf> {
             .collect(),
         azimuth_offset_deg: REPORT_OFFSET_DEG,
         lens: lens(&request.scene),
+        sector: request.scene.sector(),
         client: true,
         appearance: true,
         ..Settings::default()

@@ -7,12 +7,42 @@ use super::out::{print, say};
 use super::progress::Bars;
 use crate::error::Result;
 use crate::report::species::SpeciesReport;
-use crate::species::{BakedSpecies, Species, bake_species, to_json};
+use crate::species::{Species, bake_species, standing, to_json};
 use crate::threads::pool;
 
+/// A species' package as it is at the end.
+pub struct Standing {
+    /// Its figures.
+    pub report: SpeciesReport,
+    /// How many files were written; `None`: those that are there are what a bake would make.
+    pub written: Option<usize>,
+}
+
 /// Bakes the species and says what came of it.
-pub fn run(species: &Species, threads: usize, quiet: bool, json: bool) -> Result<()> {
+pub fn run(species: &Species, rebake: bool, threads: usize, quiet: bool, json: bool) -> Result<()> {
     let started = Instant::now();
+    let made = made(species, rebake, threads, quiet)?;
+    if json {
+        print(&(to_json(&made.report)? + "\n"))
+    } else if !quiet {
+        let seconds = started.elapsed().as_secs_f64();
+        let folder = species.request.output.display();
+        let end = match made.written {
+            Some(files) => format!("\n{files} files in {folder} after {seconds:.1} s.\n"),
+            None => format!("\n{folder} is unchanged, after {seconds:.1} s.\n"),
+        };
+        print(&(table(&made.report) + &end))
+    } else {
+        Ok(())
+    }
+}
+
+/// Bakes the species unless its package stands already or is to be baked again.
+pub fn made(species: &Species, rebake: bool, threads: usize, quiet: bool) -> Result<Standing> {
+    if let (false, Some(report)) = (rebake, standing(species)) {
+        let written = None;
+        return Ok(Standing { report, written });
+    }
     let bars = Bars::new(quiet);
     let baked = pool(threads)?.install(|| bake_species(species, &bars));
     bars.finish();
@@ -20,24 +50,17 @@ pub fn run(species: &Species, threads: usize, quiet: bool, json: bool) -> Result
     for warning in baked.warnings.iter().filter(|_| !quiet) {
         say(format_args!("warning: {warning}"));
     }
-    if json {
-        print(&(to_json(&baked.report)? + "\n"))
-    } else if !quiet {
-        let seconds = started.elapsed().as_secs_f64();
-        let folder = species.request.output.display();
-        let files = baked.files.len();
-        let end = format!("\n{files} files in {folder} after {seconds:.1} s.\n");
-        print(&(table(&baked) + &end))
-    } else {
-        Ok(())
-    }
+    Ok(Standing {
+        written: Some(baked.files.len()),
+        report: baked.report,
+    })
 }
 
-fn table(baked: &BakedSpecies) -> String {
+fn table(report: &SpeciesReport) -> String {
     let mut out = head();
-    let levels = baked.report.trees.iter().flat_map(|t| &t.report.levels);
+    let levels = report.trees.iter().flat_map(|t| &t.report.levels);
     levels.for_each(|level| out += &line(level));
-    out + "\n" + &pages(&baked.report)
+    out + "\n" + &pages(report)
 }
 
 /// One line a page.

@@ -88,6 +88,16 @@ impl Card {
         }
     }
 
+    /// The same piece of the plane with its front where its back is.
+    pub fn turned(&self) -> Self {
+        let mirrored = self.outline.iter().rev();
+        Self {
+            u: -self.u,
+            outline: mirrored.map(|p| Vec2::new(-p.x, p.y)).collect(),
+            ..self.clone()
+        }
+    }
+
     /// Unit normal of the front.
     pub fn normal(&self) -> Vec3 {
         self.u.cross(self.v)

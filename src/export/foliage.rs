@@ -206,13 +206,15 @@ impl Foliage {
         out
     }
 
-    /// Base colour with alpha, tangent-space normals, and occlusion-roughness-metalness.
-    pub fn images(&self) -> [Image; 3] {
-        let page = |name: &str, pixel: fn(&Stored, u8) -> [u8; 4]| {
+    /// Base colour with alpha; where light is to fall on it, tangent-space normals and
+    /// occlusion-roughness-metalness, too.
+    pub fn images(&self, lit: bool) -> Vec<Image> {
+        type Pixel = fn(&Stored, u8) -> [u8; 4];
+        let page = |(name, pixel): (&&str, Pixel)| {
             let texels = self.texels.par_iter().zip(&self.alpha);
             let pixels: Vec<[u8; 4]> = texels.map(|(t, &a)| pixel(t, a)).collect();
             Image {
-                name: name.into(),
+                name: (*name).into(),
                 width: self.size[0],
                 height: self.size[1],
                 rgba: Arc::new(pixels.into_flattened()),
@@ -221,20 +223,21 @@ impl Foliage {
         fn byte(v: f32) -> u8 {
             (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8
         }
-        [
-            page(IMAGES[0], |t, a| {
+        let pixels: [Pixel; 3] = [
+            |t, a| {
                 let [r, g, b] = t.srgb();
                 [r, g, b, a]
-            }),
-            page(IMAGES[1], |t, _| {
+            },
+            |t, _| {
                 let n = t.normal().normalize_or(Vec3::Z) * 0.5 + 0.5;
                 [byte(n.x), byte(n.y), byte(n.z), 255]
-            }),
-            page(IMAGES[2], |t, _| {
+            },
+            |t, _| {
                 let [o, r, m] = t.orm().to_array().map(byte);
                 [o, r, m, 255]
-            }),
-        ]
+            },
+        ];
+        names(lit).iter().zip(pixels).map(page).collect()
     }
 }
 
@@ -248,10 +251,20 @@ fn placed_texels(chart: &Chart, width: u32) -> impl Iterator<Item = (usize, usiz
 }
 
 /// Names of the images of [`Foliage::images`].
-pub const IMAGES: [&str; 3] = ["foliage_base_color", "foliage_normal", "foliage_orm"];
+const IMAGES: [&str; 3] = ["foliage_base_color", "foliage_normal", "foliage_orm"];
+
+/// Those of them that a page has.
+pub fn names(lit: bool) -> &'static [&'static str] {
+    &IMAGES[..if lit { 3 } else { 1 }]
+}
+
+/// Where the images of the page of a level with cards begin: they are its last.
+pub fn first_of_page(images: &[Image]) -> Option<usize> {
+    images.iter().rposition(|image| image.name == IMAGES[0])
+}
 
 /// The material of the cards; its images are numbered from `first_image`.
-pub fn material(first_image: u32) -> Material {
+pub fn material(first_image: u32, lit: bool) -> Material {
     let texture = |k: u32| {
         Some(TextureRef {
             image: first_image + k,
@@ -260,12 +273,14 @@ pub fn material(first_image: u32) -> Material {
             linear: true,
         })
     };
+    let light = |k: u32| texture(k).filter(|_| lit);
     Material {
         name: "foliage".into(),
         base_color: texture(0),
-        normal: texture(1),
-        metallic_roughness: texture(2),
-        occlusion: texture(2),
+        normal: light(1),
+        metallic_roughness: light(2),
+        occlusion: light(2),
+        unlit: !lit,
         alpha_mode: AlphaMode::Mask,
         alpha_cutoff: 0.5,
         double_sided: true,

@@ -103,7 +103,7 @@ pub fn write_hierarchy(
     page: [u32; 2],
 ) -> Result<Vec<u8>> {
     let mut file = FileBuilder::default();
-    let billboards = add_billboards(&mut file, tiles, places, page)?;
+    let billboards = add_billboards(&mut file, tiles, places, page, !model.is_unlit())?;
     let numbers = file.materials(&tips.scene, &tips.pngs);
     let mut geometry = Vec::with_capacity(tips.tiles.len());
     for (tile, surfaces) in tips.each() {
@@ -123,8 +123,10 @@ fn add_billboards(
     tiles: &[TileFiles],
     places: &[[u32; 4]],
     page: [u32; 2],
+    lit: bool,
 ) -> Result<Vec<usize>> {
-    let mut texels = [0; 3].map(|_| vec![0; page[0] as usize * page[1] as usize * 4]);
+    let names = foliage::names(lit);
+    let mut texels = vec![vec![0; page[0] as usize * page[1] as usize * 4]; names.len()];
     let mut nodes = Vec::new();
     let mut scenes = Vec::new();
     for (tile, &[x, y, w, h]) in tiles.iter().zip(places) {
@@ -134,7 +136,7 @@ fn add_billboards(
         let mut scene = level.scene.clone();
         if w > 0 {
             // Cards come last, and so do their images.
-            let cards = scene.images.split_off(scene.images.len() - 3);
+            let cards = scene.images.split_off(scene.images.len() - names.len());
             for (page_texels, image) in texels.iter_mut().zip(cards) {
                 blocks::copy(page_texels, page[0], &image.rgba, [w, h], [x, y]);
             }
@@ -150,8 +152,8 @@ fn add_billboards(
         scenes.push((tile, scene, w > 0));
     }
     let page_scene = Scene {
-        materials: vec![foliage::material(0)],
-        images: foliage::IMAGES
+        materials: vec![foliage::material(0, lit)],
+        images: names
             .iter()
             .zip(texels)
             .map(|(name, rgba)| Image {

@@ -7,10 +7,11 @@ use rayon::prelude::*;
 
 use super::refine::Target;
 use crate::botany::model::{Model, Wrap};
-use crate::space::directions::{Direction, training};
+use crate::space::directions::Direction;
 use crate::space::raster::{
     Camera, Geometry, Mask, Material, Mips, Sampling, Scene, Texture, coverage,
 };
+use crate::space::sector::Sector;
 use crate::space::texture::cutoff;
 
 /// One sample each: masks are fine enough.
@@ -21,6 +22,8 @@ const SAMPLING: Sampling = Sampling {
 
 /// Masks of the original from the training directions.
 pub struct Original {
+    /// Where the tree is seen from.
+    pub sector: Sector,
     /// The directions.
     pub directions: Vec<Direction>,
     /// One mask a direction, at `samples_per_unit`.
@@ -80,8 +83,8 @@ pub fn camera(direction: &Direction, pixels: f32) -> Camera {
 }
 
 impl Original {
-    /// Renders `model` from `views` directions, the tree `height_samples` samples high.
-    pub fn new(model: &Model, views: u32, height_samples: f32) -> Self {
+    /// Renders `model` from `views` directions of a sector, the tree `height_samples` samples high.
+    pub fn new(model: &Model, views: u32, sector: Sector, height_samples: f32) -> Self {
         let textures: Vec<Texture> = model
             .images
             .par_iter()
@@ -110,7 +113,7 @@ impl Original {
         };
         let height = model.height().max(1e-6);
         let samples_per_unit = height_samples / height;
-        let directions = training(views);
+        let directions = sector.training(views);
         let cameras: Vec<Camera> = directions
             .iter()
             .map(|d| camera(d, samples_per_unit))
@@ -120,6 +123,7 @@ impl Original {
                 .par_iter()
                 .map(|camera| Bits::of(&coverage(&scene, camera, SAMPLING)))
                 .collect(),
+            sector,
             directions,
             samples_per_unit,
             height,

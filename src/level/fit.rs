@@ -60,10 +60,11 @@ impl Baker<'_> {
     /// Gives a plan its wood and texels.
     pub(super) fn fit(
         &self,
-        plan: LevelPlan,
+        mut plan: LevelPlan,
         request: LevelRequest,
         watch: &dyn Watch,
     ) -> Result<Fitted> {
+        self.face_the_eye(&mut plan);
         let request = request.no_nearer_than(self.rms_error(&plan), self.original.height);
         part(watch, "project")?;
         let mut foliage = Foliage::bake(
@@ -219,13 +220,13 @@ impl Fitted {
     }
 
     /// Bleeds the texels and joins wood and cards.
-    pub fn level(mut self, tree_height: f32) -> Level {
+    pub fn level(mut self, original: &Original, lit: bool) -> Level {
         self.foliage
-            .add_backs(GAP_PX * tree_height / self.request.height_px);
+            .add_backs(GAP_PX * original.height / self.request.height_px);
         self.foliage.bleed();
         let surface = self.foliage.surface(0..self.foliage.charts.len());
         Level {
-            scene: on_page(self.wood, surface, self.foliage.images()),
+            scene: on_page(self.wood, surface, self.foliage.images(lit), lit),
             request: self.request,
             plan: self.plan,
             matched: self.matched,
@@ -249,10 +250,10 @@ impl Fitted {
 }
 
 /// Wood with cards, whose images come last.
-pub(super) fn on_page(wood: Scene, mut cards: Surface, images: [Image; 3]) -> Scene {
+pub(super) fn on_page(wood: Scene, mut cards: Surface, images: Vec<Image>, lit: bool) -> Scene {
     let mut scene = wood;
     cards.material = scene.materials.len() as u32;
-    let material = foliage::material(scene.images.len() as u32);
+    let material = foliage::material(scene.images.len() as u32, lit);
     scene.materials.push(material);
     scene.images.extend(images);
     scene.surfaces.push(cards);

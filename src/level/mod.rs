@@ -24,7 +24,7 @@ use crate::detail::wood::{Wood, WoodOption};
 use crate::error::Result;
 use crate::export::chart::Chart;
 use crate::export::coarser::{halved, halved_normals};
-use crate::export::foliage::IMAGES;
+use crate::export::foliage::first_of_page;
 use crate::export::matching::Matched;
 use crate::export::original::Original;
 use crate::export::surface::{Scene, scene_of_model};
@@ -98,7 +98,7 @@ impl LevelRequest {
 /// A level, not yet written.
 #[derive(Clone, Debug)]
 pub struct Level {
-    /// What to draw: wood, then the cards, whose three images come last.
+    /// What to draw: wood, then the cards, whose images come last.
     pub scene: Scene,
     /// What it was made for.
     pub request: LevelRequest,
@@ -126,9 +126,9 @@ impl Level {
 
     /// The same with maps of light of half the resolution: see [`coarser`](crate::export::coarser).
     pub fn with_coarser_maps(mut self) -> Self {
-        let maps = self.plan.cards.len().min(1) * (IMAGES.len() - 1);
-        let first = self.scene.images.len() - maps;
-        if let [normals, others] = &mut self.scene.images[first..] {
+        let images = &mut self.scene.images;
+        let first = first_of_page(images).filter(|_| !self.plan.cards.is_empty());
+        if let Some([_, normals, others]) = first.map(|first| &mut images[first..]) {
             *normals = halved_normals(normals);
             *others = halved(others);
         }
@@ -137,8 +137,8 @@ impl Level {
 
     /// The page of its cards: base colour with alpha.
     pub fn page(&self) -> Option<&Image> {
-        let first = self.scene.images.len().checked_sub(IMAGES.len())?;
-        self.scene.images.get(first)
+        let images = &self.scene.images;
+        first_of_page(images).map(|first| &images[first])
     }
 }
 
@@ -199,6 +199,11 @@ impl Baker<'_> {
         let other = self.fit(plan, request, watch)?;
         let better = other.least_view(self.original) > least;
         Ok(Some(if better { other } else { made }))
+    }
+
+    /// Whether light falls on the tree.
+    pub fn is_lit(&self) -> bool {
+        !self.tree.model.is_unlit()
     }
 
     /// The level of a tree that fits into its budget as it is: nothing is nearer.

@@ -22,7 +22,7 @@ impl Baker<'_> {
     /// A level with all that shares its texels, and at last what only has coarser maps of light.
     pub(super) fn finished(&self, fitted: Fitted, watch: &dyn Watch) -> Result<Level> {
         let mut shared = self.shared(&fitted, watch)?;
-        let level = fitted.level(self.original.height);
+        let level = fitted.level(self.original, self.is_lit());
         if self.recipe.sharing > 0.0 && !level.charts.is_empty() {
             shared.push(level.clone().with_coarser_maps());
         }
@@ -211,13 +211,16 @@ impl Page {
     /// A level for each guest, all with the same images: maps of light are of half the resolution.
     pub fn levels(mut self, guests: &[Guest]) -> Vec<Level> {
         self.foliage.bleed();
-        let [color, normals, others] = self.foliage.images();
-        let images = [color, halved_normals(&normals), halved(&others)];
+        let lit = guests.iter().any(|guest| guest.baker.is_lit());
+        let mut images = self.foliage.images(lit);
+        if let [_, normals, others] = &mut images[..] {
+            (*normals, *others) = (halved_normals(normals), halved(others));
+        }
         let level = |(guest, charts): (&Guest, Range<usize>)| {
             let fitted = guest.fitted;
             let surface = self.foliage.surface(charts.clone());
             Level {
-                scene: on_page(fitted.wood.clone(), surface, images.clone()),
+                scene: on_page(fitted.wood.clone(), surface, images.clone(), lit),
                 request: fitted.request,
                 plan: fitted.plan.clone(),
                 matched: self.matched,

@@ -29,7 +29,16 @@ impl Baker<'_> {
         if !self.recipe.second_sides || self.recipe.sharing > 0.0 {
             return Some(plan);
         }
-        let mut sided = differing(&self.tree.model, &plan);
+        let differing = |plan: &LevelPlan| {
+            let seen = |card: &u32| {
+                let normal = plan.cards[*card as usize].card.normal();
+                self.original.sector.sides(normal) == [true; 2]
+            };
+            let mut found = differing(&self.tree.model, plan);
+            found.retain(seen);
+            found
+        };
+        let mut sided = differing(&plan);
         for _ in 0..TRIES {
             let (own, more) = (self.cost(&plan), triangles_of(&plan, &sided));
             if own + more <= budget {
@@ -39,7 +48,7 @@ impl Baker<'_> {
                 break;
             };
             plan = coarser;
-            sided = differing(&self.tree.model, &plan);
+            sided = differing(&plan);
         }
         let mut left = budget.saturating_sub(self.cost(&plan));
         sided.retain(|&card| {
@@ -50,6 +59,19 @@ impl Baker<'_> {
         });
         plan.sided = sided;
         Some(plan)
+    }
+
+    /// Turns cards of which only the back is seen: texels are those of the front.
+    pub(super) fn face_the_eye(&self, plan: &mut LevelPlan) {
+        let sector = self.original.sector;
+        if sector.is_whole() {
+            return;
+        }
+        for group in &mut plan.cards {
+            if sector.sides(group.card.normal()) == [false, true] {
+                group.card = group.card.turned();
+            }
+        }
     }
 
     /// Triangles of a plan.

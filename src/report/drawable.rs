@@ -2,7 +2,7 @@
 
 use crate::botany::Model;
 use crate::botany::model::{self, AlphaMode, Frame, TextureRef};
-use crate::space::raster::{Geometry, Material, Placement, Relief, Scene, Texture, Wrap};
+use crate::space::raster::{Geometry, Light, Material, Placement, Relief, Scene, Texture, Wrap};
 
 /// Alpha from which a blended sample counts as covered.
 const BLEND_CUTOFF: f32 = 0.5;
@@ -72,6 +72,14 @@ impl<'m> Drawable<'m> {
             },
             materials: &self.materials,
             textures: &self.textures,
+        }
+    }
+
+    /// How it is lit where light falls on trees.
+    pub fn light(&self) -> Light {
+        match self.model.is_unlit() {
+            true => Light::Unlit,
+            false => Light::Outdoors,
         }
     }
 

@@ -10,7 +10,8 @@ use super::measure::{Asked, actors, measure};
 use super::schema::{Level, Report};
 use crate::botany::Model;
 use crate::space::raster::{Sampling, coverage_with_stats};
-use crate::space::view::{DEFAULT_VIEWS, ELEVATIONS, Lens, View, views_at};
+use crate::space::sector::Sector;
+use crate::space::view::{DEFAULT_VIEWS, ELEVATIONS, Lens, View, views_of};
 
 /// How levels are evaluated.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,12 +21,14 @@ pub struct Settings {
     /// For each level the height from which it is shown, pixels: it is measured there and at half
     /// of it (twice the distance) as well. May be shorter than the list of levels.
     pub own_heights_px: Vec<Option<u32>>,
-    /// Number of views, the top included (at least; see [`views_at`]).
+    /// Number of views, the top included (at least; see [`views_of`]).
     pub views: usize,
     /// Azimuth of the first view, degrees.
     pub azimuth_offset_deg: f32,
     /// Elevations of the views, degrees above the horizon.
     pub elevations_deg: Vec<f32>,
+    /// Where the tree is seen from: views outside move into it.
+    pub sector: Sector,
     /// How lines of sight run.
     pub lens: Lens,
     /// Whether levels and original are also drawn as an engine draws them.
@@ -42,6 +45,7 @@ impl Default for Settings {
             views: DEFAULT_VIEWS,
             azimuth_offset_deg: 0.0,
             elevations_deg: ELEVATIONS.to_vec(),
+            sector: Sector::default(),
             lens: Lens::default(),
             client: false,
             appearance: false,
@@ -72,7 +76,8 @@ impl Settings {
 
     /// The views that these settings ask for.
     pub fn view_set(&self) -> Vec<View> {
-        views_at(&self.elevations_deg, self.views, self.azimuth_offset_deg)
+        let (elevations, count) = (&self.elevations_deg, self.views);
+        views_of(&self.sector, elevations, count, self.azimuth_offset_deg)
     }
 }
 

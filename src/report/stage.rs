@@ -111,7 +111,7 @@ impl<'m> Actor<'m> {
         };
         let camera = camera.placed(self.place);
         let reliefs: Vec<Option<Relief>> = self.drawable.reliefs();
-        layers(&scene, &camera, sampling, Light::Outdoors, &reliefs)
+        layers(&scene, &camera, sampling, self.drawable.light(), &reliefs)
     }
 
     /// Where it is, supersampled.

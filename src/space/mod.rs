@@ -18,6 +18,7 @@ pub mod polyline;
 pub mod random;
 pub mod raster;
 pub mod root;
+pub mod sector;
 pub mod sha256;
 #[cfg(feature = "bake")]
 pub mod texture;

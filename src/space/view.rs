@@ -3,6 +3,7 @@
 use glam::Vec3;
 
 use super::raster::Camera;
+use super::sector::Sector;
 
 /// Elevations of the rings of views where nothing else is asked for, degrees above the horizon.
 pub const ELEVATIONS: [f32; 3] = [0.0, 30.0, -15.0];
@@ -83,7 +84,7 @@ pub fn views_at(elevations: &[f32], count: usize, offset_deg: f32) -> Vec<View> 
         (0..azimuths).map(move |i| {
             let azimuth_deg = (360.0 * i as f32 / azimuths as f32 + offset_deg).rem_euclid(360.0);
             View {
-                name: format!("azimuth {azimuth_deg:.0} elevation {elevation_deg:.0}"),
+                name: view_name(azimuth_deg, elevation_deg),
                 azimuth_deg,
                 elevation_deg,
             }
@@ -100,6 +101,35 @@ pub fn views_at(elevations: &[f32], count: usize, offset_deg: f32) -> Vec<View> 
         .flat_map(ring)
         .chain([top])
         .collect()
+}
+
+/// As [`views_at`], of a sector: its arc takes the azimuths, elevations outside are those of its rim, and there is
+/// a view from the top where it has one.
+pub fn views_of(sector: &Sector, elevations: &[f32], count: usize, offset_deg: f32) -> Vec<View> {
+    if sector.is_whole() {
+        return views_at(elevations, count, offset_deg);
+    }
+    let [low, high] = sector.elevations_deg;
+    let mut inside: Vec<f32> = elevations.iter().map(|e| e.clamp(low, high)).collect();
+    inside.sort_by(f32::total_cmp);
+    inside.dedup();
+    let mut views = views_at(&inside, count, offset_deg);
+    if !sector.has_top() {
+        views.pop();
+    }
+    for view in views.iter_mut().filter(|view| view.name != "top") {
+        // The first and the last lie half a step inside; a full circle stays as it is.
+        view.azimuth_deg = match sector.is_around() {
+            true => view.azimuth_deg,
+            false => sector.azimuth_deg(view.azimuth_deg / 360.0),
+        };
+        view.name = view_name(view.azimuth_deg, view.elevation_deg);
+    }
+    views
+}
+
+fn view_name(azimuth_deg: f32, elevation_deg: f32) -> String {
+    format!("azimuth {azimuth_deg:.0} elevation {elevation_deg:.0}")
 }
 
 impl View {

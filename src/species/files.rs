@@ -6,6 +6,7 @@ use std::sync::Arc;
 use crate::botany::model::Image;
 use crate::error::{Error, Result};
 use crate::export::combined::{Packed, Stand, write_species};
+use crate::export::foliage::first_of_page;
 use crate::export::gltf::write_linked;
 use crate::export::manifest::SUFFIX;
 use crate::export::package::Package;
@@ -76,14 +77,14 @@ impl<'a> Files<'a> {
         let mut known: Vec<(Image, String)> = Vec::new();
         levels.retain(|level| level.shown);
         for level in &mut levels {
-            let own = level.scene.images.len();
-            let mut uris = Vec::with_capacity(own);
+            let first = first_of_page(&level.scene.images);
+            let mut uris = Vec::with_capacity(level.scene.images.len());
             for (i, image) in level.scene.images.iter().enumerate() {
                 let same = |(other, _): &&(Image, String)| Arc::ptr_eq(&other.rgba, &image.rgba);
                 let uri = match known.iter().find(same) {
                     Some((_, uri)) => uri.clone(),
                     None => {
-                        let of_page = page.filter(|_| i + 3 >= own);
+                        let of_page = page.filter(|_| first.is_some_and(|first| i >= first));
                         let uri = self.image(of_page, image)?;
                         known.push((image.clone(), uri.clone()));
                         uri

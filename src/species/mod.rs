@@ -6,6 +6,7 @@
 
 mod files;
 mod page;
+mod standing;
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -18,16 +19,20 @@ use crate::level::{Baker, Level, LevelRequest};
 use crate::levels::{Levels, needed};
 use crate::pipeline::{cuts, original_file, pixels, read_back, settings};
 use crate::prepared::{Pieces, Prepared};
+use crate::recipe::Recipe;
 use crate::report::band::Fault;
 use crate::report::species::{SharedPage, SpeciesReport, SpeciesTree};
 use crate::report::{Cuts, judge};
 use crate::request::Request;
+use crate::scene::Scene;
 use crate::sharing::Ruler;
 use crate::verdict::{REFUSED, in_band, refusal};
 use crate::watch::{Deadline, Watch, begin, part, step};
 use files::Files;
 pub use files::to_json;
 use page::{Candidate, Copied};
+use standing::check_memory;
+pub use standing::standing;
 
 /// What to bake.
 #[derive(Clone, Debug, Default)]
@@ -37,6 +42,9 @@ pub struct Species {
     /// Everything else: `output` is the package's folder, whose name is the species'; `input` is filled in for
     /// each tree.
     pub request: Request,
+    /// What each tree is looked at with, where that differs in distances and sizes; those of one size share a page.
+    /// Where there is none for a tree, the request's.
+    pub scenes: Vec<Scene>,
 }
 
 /// What was baked.
@@ -60,7 +68,7 @@ pub const LOSS: f64 = 0.01;
 pub fn bake_species(species: &Species, watch: &dyn Watch) -> Result<BakedSpecies> {
     let recipe = &species.request.recipe;
     check(recipe)?;
-    check(&species.request.scene)?;
+    of_all(species).iter().try_for_each(|r| check(&r.scene))?;
     recipe.packer.check()?;
     if recipe.instancing || recipe.hierarchy {
         return Err(Error::usage(
@@ -69,22 +77,20 @@ pub fn bake_species(species: &Species, watch: &dyn Watch) -> Result<BakedSpecies
         ));
     }
     let deadline = Deadline::new(watch, recipe.most_seconds);
-    let mut species = species.clone();
-    if recipe.sharing == 0.0 {
-        species.request.recipe.sharing = LOSS;
-    }
-    made(&species, &deadline).map_err(|error| deadline.explain(error))
+    made(species, &deadline).map_err(|error| deadline.explain(error))
 }
 
 fn made(species: &Species, watch: &dyn Watch) -> Result<BakedSpecies> {
     let name = name(species)?;
     let output = &species.request.output;
+    let mut warnings: Vec<String> = check_memory(species)?.into_iter().collect();
     let package = Package::start(output, species.request.force)?;
-    let requests: Vec<Request> = species.inputs.iter().map(|i| of(species, i)).collect();
+    let requests = of_all(species);
     let prepared = requests.iter().map(|r| Prepared::new(r, watch));
     let trees: Vec<Prepared> = prepared.collect::<Result<_>>()?;
-    let recipe = &species.request.recipe;
-    let pieces = trees.iter().map(|t| Pieces::new(&t.tree, recipe, watch));
+    let recipe = &recipe(species);
+    let pieces = trees.iter().zip(&requests);
+    let pieces = pieces.map(|(t, r)| Pieces::new(&t.tree, recipe, &r.scene, watch));
     let pieces: Vec<Pieces> = pieces.collect::<Result<_>>()?;
     let bakers: Vec<Baker> = pieces.iter().map(|p| p.baker(recipe)).collect();
     begin(watch, "describe", 1)?;
@@ -111,7 +117,6 @@ fn made(species: &Species, watch: &dyn Watch) -> Result<BakedSpecies> {
         pages,
         ..SpeciesReport::default()
     };
-    let mut warnings = Vec::new();
     let mut found = Vec::new();
     begin(watch, "measure", trees.len() as u64)?;
     for ((t, levels), best) in trees.iter().zip(&levels).zip(candidates) {
@@ -201,11 +206,26 @@ fn name(species: &Species) -> Result<String> {
     Ok(name.into_owned())
 }
 
-fn of(species: &Species, input: &std::path::Path) -> Request {
-    Request {
-        input: input.into(),
-        ..species.request.clone()
-    }
+/// The species' recipe, which shares.
+fn recipe(species: &Species) -> Recipe {
+    let recipe = species.request.recipe.clone();
+    let sharing = match recipe.sharing {
+        0.0 => LOSS,
+        asked => asked,
+    };
+    Recipe { sharing, ..recipe }
+}
+
+/// What is asked for each tree.
+fn of_all(species: &Species) -> Vec<Request> {
+    let (request, recipe) = (&species.request, recipe(species));
+    let of = |(i, input): (usize, &PathBuf)| Request {
+        input: input.clone(),
+        recipe: recipe.clone(),
+        scene: species.scenes.get(i).unwrap_or(&request.scene).clone(),
+        ..request.clone()
+    };
+    species.inputs.iter().enumerate().map(of).collect()
 }
 
 /// Makes the levels of all trees, those that start at one size together.

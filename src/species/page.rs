@@ -2,6 +2,7 @@
 
 use crate::error::Result;
 use crate::export::chart::{Chart, Shape};
+use crate::export::foliage::names;
 use crate::export::png::encode_png;
 use crate::export::share::{owners, sheet};
 use crate::level::{Baker, Fitted, Guest, Level, Table, half};
@@ -31,6 +32,8 @@ pub struct Seated {
     /// Texels along a line over those of pages of their own.
     density: f64,
     bytes_without: u64,
+    /// Whether light falls on any of them.
+    lit: bool,
 }
 
 /// The levels on the smallest page on which none loses more F1 than the recipe allows where it starts; on
@@ -46,8 +49,8 @@ pub fn seat(
     watch: &dyn Watch,
 ) -> Result<Seated> {
     let alone = |c: &Candidate| {
-        let height = bakers[c.tree].original.height;
-        c.fitted.clone().level(height)
+        let baker = &bakers[c.tree];
+        c.fitted.clone().level(baker.original, baker.is_lit())
     };
     let figures: Vec<Figure> = candidates
         .iter()
@@ -57,9 +60,10 @@ pub fn seat(
         f1: figures.iter().map(|f| [f.mean; 2]).collect(),
         bytes_without: candidates
             .iter()
-            .map(|c| page_bytes(c.fitted.page_size()))
+            .map(|c| page_bytes(c.fitted.page_size(), bakers[c.tree].is_lit()))
             .sum(),
         density: 1.0,
+        lit: candidates.iter().any(|c| bakers[c.tree].is_lit()),
         ..Seated::default()
     };
     let guests: Vec<Guest> = candidates
@@ -170,11 +174,11 @@ impl Seated {
             copies: copies.len() as u64,
             copies_of_others: copies.iter().filter(|c| c.card.0 != c.of.0).count() as u64,
             bytes_with: match self.shared {
-                true => bytes_with_coarser_maps(size),
+                true => bytes_with_coarser_maps(size, self.lit),
                 false => self
                     .levels
                     .iter()
-                    .map(|(_, l)| bytes_with_coarser_maps(l.atlas))
+                    .map(|(_, l)| bytes_with_coarser_maps(l.atlas, self.lit))
                     .sum(),
             },
             bytes_without: self.bytes_without,
@@ -194,14 +198,15 @@ fn image_bytes([mut w, mut h]: [u32; 2]) -> u64 {
     4 * texels
 }
 
-/// Bytes of the three images of a page.
-fn page_bytes(size: [u32; 2]) -> u64 {
-    3 * image_bytes(size)
+/// Bytes of the images of a page.
+fn page_bytes(size: [u32; 2], lit: bool) -> u64 {
+    names(lit).len() as u64 * image_bytes(size)
 }
 
 /// Bytes of a page whose maps of light are of half the resolution.
-fn bytes_with_coarser_maps(size: [u32; 2]) -> u64 {
-    image_bytes(size) + 2 * image_bytes(size.map(|side| (side / 2).max(1)))
+fn bytes_with_coarser_maps(size: [u32; 2], lit: bool) -> u64 {
+    let maps = names(lit).len() as u64 - 1;
+    image_bytes(size) + maps * image_bytes(size.map(|side| (side / 2).max(1)))
 }
 
 /// Adds up the pages.
@@ -217,13 +222,15 @@ mod tests {
 
     #[test]
     fn a_page_is_three_images_with_all_mips() {
-        assert_eq!(page_bytes([1, 1]), 12);
+        assert_eq!(page_bytes([1, 1], true), 12);
         // 4 x 2, 2 x 1, 1 x 1.
-        assert_eq!(page_bytes([4, 2]), 12 * (8 + 2 + 1));
-        assert_eq!(page_bytes([0, 0]), 0);
+        assert_eq!(page_bytes([4, 2], true), 12 * (8 + 2 + 1));
+        assert_eq!(page_bytes([4, 2], false), 4 * (8 + 2 + 1));
+        assert_eq!(page_bytes([0, 0], true), 0);
         assert_eq!(
-            bytes_with_coarser_maps([4, 2]),
+            bytes_with_coarser_maps([4, 2], true),
             4 * (8 + 2 + 1) + 2 * 4 * (2 + 1)
         );
+        assert_eq!(bytes_with_coarser_maps([4, 2], false), 4 * (8 + 2 + 1));
     }
 }

@@ -12,6 +12,7 @@ use crate::error::Result;
 use crate::export::original::Original;
 use crate::level::{Baker, Level, LevelRequest};
 use crate::recipe::Recipe;
+use crate::scene::Scene;
 use crate::watch::Watch;
 
 /// Texels for a normalised unit of a tile: its bounding sphere has a radius of one.
@@ -46,7 +47,7 @@ pub struct Look {
 /// [`Error::Interrupted`](crate::error::Error::Interrupted).
 pub fn look(
     tree: &Tree,
-    recipe: &Recipe,
+    (recipe, scene): (&Recipe, &Scene),
     triangles: u64,
     watch: &dyn Watch,
 ) -> Result<Option<Look>> {
@@ -65,7 +66,7 @@ pub fn look(
         elements: &elements,
         hierarchy: &merge(&elements, recipe.locality),
         wood: &Wood::new(tree, true),
-        original: &Original::new(&tree.model, views, SAMPLES * height_texels),
+        original: &Original::new(&tree.model, views, scene.sector(), SAMPLES * height_texels),
         recipe,
     };
     let request = LevelRequest {

@@ -110,7 +110,7 @@ fn tile(
         0 => WHOLE_TREE_TRIANGLES,
         _ => u64::from(recipe.tile_triangles),
     };
-    let look = look(&part, recipe, triangles, &Quiet(watch))?;
+    let look = look(&part, (recipe, scene), triangles, &Quiet(watch))?;
     let mut tile = Tile {
         parent,
         ..describe(index, found, &part, look.as_ref(), scene)
