@@ -24,6 +24,8 @@ pub mod botany;
 #[cfg(feature = "bake")]
 pub mod cli;
 #[cfg(feature = "bake")]
+pub mod client;
+#[cfg(feature = "bake")]
 pub mod cloud;
 #[cfg(feature = "bake")]
 pub mod describe;

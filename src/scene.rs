@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::client::Client;
 use crate::knobs::{Knobs, Range};
 use crate::space::sector::Sector;
 
@@ -18,6 +19,48 @@ pub enum ScenePreset {
     /// Seen from high above, as on a map: never nearer than 300 m, 30 degrees of view; nothing is
     /// drawn under 4 pixels.
     Map,
+}
+
+/// How texels lie on the GPU.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum TextureFormat {
+    /// Uncompressed.
+    #[default]
+    Rgba8,
+    /// 4 x 4 texels in 16 bytes.
+    Bc3,
+    /// 4 x 4 texels in 16 bytes, finer than BC3.
+    Bc7,
+    /// 4 x 4 texels in 16 bytes.
+    Astc4x4,
+    /// 4 x 4 texels in 16 bytes, alpha by EAC.
+    Etc2,
+}
+
+impl TextureFormat {
+    /// Bytes of a texel.
+    pub fn texel_bytes(self) -> f64 {
+        match self {
+            Self::Rgba8 => 4.0,
+            Self::Bc3 | Self::Bc7 | Self::Astc4x4 | Self::Etc2 => 1.0,
+        }
+    }
+
+    /// Whether mips can be shipped in it.
+    pub fn can_be_shipped(self) -> bool {
+        matches!(self, Self::Rgba8 | Self::Bc3 | Self::Bc7)
+    }
+}
+
+/// Who makes mips.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Mips {
+    /// The engine, of the PNGs in the files, by a box filter.
+    #[default]
+    Engine,
+    /// The bake: each image beside its level as a DDS file with all mips in the scene's texture format, in which as
+    /// many texels pass the alpha test as in the image.
+    Shipped,
 }
 
 /// The screen that distances are stated for. Read from RON; keys that are left out keep the default.
@@ -53,6 +96,12 @@ pub struct Scene {
     /// Whether light falls on trees; default true. Otherwise levels have base colours alone
     /// (KHR_materials_unlit), and no maps that only light shows are made.
     pub lit: bool,
+    /// Who makes mips; default `Engine`.
+    pub mips: Mips,
+    /// How texels lie on the GPU; default `Rgba8`. Plans count bytes by it; reports count uncompressed ones.
+    pub texture_format: TextureFormat,
+    /// Who loads the package; default `Any`. Warnings say what it will not do.
+    pub engine: Client,
     /// Levels fade into each other between their distance and this many times that, 1 to 2;
     /// default 1.1.
     pub fade: f64,
@@ -72,6 +121,9 @@ impl Default for Scene {
             azimuths_deg: Sector::default().azimuths_deg,
             elevations_deg: Sector::default().elevations_deg,
             lit: true,
+            mips: Mips::default(),
+            texture_format: TextureFormat::default(),
+            engine: Client::default(),
             fade: 1.1,
         }
     }

@@ -10,6 +10,7 @@ mod inspect;
 mod out;
 mod page;
 mod plan;
+mod plan_bake;
 mod progress;
 mod scene;
 mod species;

@@ -2,16 +2,16 @@
 
 use std::path::{Path, PathBuf};
 
-use super::out::{print, say};
-use super::progress::{Bars, catch_ctrl_c};
+use super::out::print;
+use super::plan_bake::Baking;
+use super::progress::catch_ctrl_c;
 use super::scene::scene;
-use crate::batch::{Batch, Done, bake_all};
+use crate::client::Takes;
 use crate::error::{Error, Result};
 use crate::knobs::read;
-use crate::pipeline::{Request, Wanted};
 use crate::plan::{Answer, Spec, SpeciesAnswer, plan};
 use crate::recipe::{Preset, Recipe};
-use crate::report::schema::Report;
+use crate::scene::Mips;
 
 /// Say what a scene needs of its trees and what that costs; with --bake, bake just that.
 #[derive(clap::Args, Debug)]
@@ -58,8 +58,21 @@ pub fn run(args: &Args) -> Result<()> {
     let folder = args.plan.parent().unwrap_or(Path::new(""));
     catch_ctrl_c()?;
     let mut answer = plan(&spec, folder)?;
-    if args.bake {
-        bake(args, &spec, &mut answer)?;
+    if let (true, Some(output)) = (args.bake, &args.output) {
+        let preset = Recipe::preset(args.preset);
+        let recipe = match &args.recipe {
+            Some(file) => read(file, &preset)?,
+            None => preset,
+        };
+        let baking = Baking {
+            spec: &spec,
+            recipe,
+            output,
+            accept: args.accept,
+            threads: args.threads.into(),
+            quiet: args.quiet,
+        };
+        baking.bake(&mut answer)?;
     }
     let text = serde_json::to_string_pretty(&answer).map_err(|e| Error::Internal {
         step: "plan",
@@ -77,108 +90,27 @@ pub fn run(args: &Args) -> Result<()> {
     }
 }
 
-/// Bakes each species with a scene of its own, and puts what was measured into the answer.
-fn bake(args: &Args, spec: &Spec, answer: &mut Answer) -> Result<()> {
-    let Some(output) = &args.output else {
-        return Ok(());
-    };
-    let preset = Recipe::preset(args.preset);
-    let recipe = match &args.recipe {
-        Some(file) => read(file, &preset)?,
-        None => preset,
-    };
-    let mut disk = 0;
-    for species in answer.species.iter_mut() {
-        let Some(request) = request(species, spec, &recipe, args.accept) else {
-            continue;
-        };
-        let batch = Batch {
-            inputs: vec![species.input.clone()],
-            output: output.clone(),
-            request,
-            rebake: false,
-            threads: args.threads.into(),
-        };
-        let bars = Bars::new(args.quiet);
-        let outcomes = bake_all(&batch, &bars);
-        bars.finish();
-        for outcome in outcomes? {
-            let report = match outcome.done {
-                Done::Baked(baked) => {
-                    for warning in baked.warnings.iter().filter(|_| !args.quiet) {
-                        say(format_args!("warning: {}: {warning}", species.name));
-                    }
-                    baked.report
-                }
-                Done::Unchanged => report(&outcome.output)?,
-                Done::Failed(error) => return Err(error),
-            };
-            measured(species, &report, spec);
-            disk += size(&outcome.output)?;
-        }
-    }
-    answer.texture_bytes_estimated = false;
-    answer.disk_bytes = Some(disk);
-    answer.add_up();
-    Ok(())
-}
-
-/// What to bake of a species; `None` where it is never seen.
-fn request(species: &SpeciesAnswer, spec: &Spec, recipe: &Recipe, accept: bool) -> Option<Request> {
-    species.nearest_m?;
-    Some(Request {
-        wanted: Wanted::Levels(spec.levels.into()),
-        recipe: recipe.clone(),
-        scene: species.scene.clone(),
-        accept,
-        ..Request::default()
-    })
-}
-
-fn report(package: &Path) -> Result<Report> {
-    let file = package.join("report.json");
-    let text = std::fs::read_to_string(&file).map_err(|e| Error::io(&file, "read", e))?;
-    serde_json::from_str(&text)
-        .map_err(|e| Error::input(&file, "the report", e.to_string(), "bake the tree again"))
-}
-
-/// Textures and triangles of the levels that were baked.
-fn measured(species: &mut SpeciesAnswer, report: &Report, spec: &Spec) {
-    for level in &report.levels {
-        let height = level.sizes.first().map(|s| f64::from(s.height_px));
-        let same = |px: Option<f64>| {
-            px.zip(height)
-                .is_some_and(|(a, b)| (a.round() - b).abs() < 1.0)
-        };
-        if let Some(found) = species.levels.iter_mut().find(|l| same(l.height_px)) {
-            found.triangles = level.triangles;
-            found.texture_bytes = (level.texture_bytes as f64 / 4.0 * spec.texel_bytes) as u64;
-        }
-    }
-}
-
-/// Bytes of all files of a folder.
-fn size(folder: &Path) -> Result<u64> {
-    let fail = |e| Error::io(folder, "list", e);
-    let mut sum = 0;
-    for entry in std::fs::read_dir(folder).map_err(fail)? {
-        sum += entry.and_then(|e| e.metadata()).map_err(fail)?.len();
-    }
-    Ok(sum)
-}
-
 fn table(answer: &Answer, spec: &Spec) -> String {
     let mib = |bytes: u64| bytes as f64 / 1_048_576.0;
     let mut out = format!(
-        "{:<24}{:>7}{:>11}{:>10}{:>10}{:>7}{:>12}{:>11}\n",
-        "species", "level", "triangles", "from m", "at px", "needed", "trees mean", "tex MB"
+        "{:<24}{:>7}{:>11}{:>10}{:>10}{:>10}{:>7}{:>12}{:>11}\n",
+        "species",
+        "level",
+        "triangles",
+        "from m",
+        "at px",
+        "texels/m",
+        "needed",
+        "trees mean",
+        "tex MB"
     );
     for species in &answer.species {
         let mut head = species.name.as_str();
         for (number, level) in species.levels.iter().enumerate() {
             let px = level.height_px.map_or("-".into(), |px| format!("{px:.0}"));
+            let texels = level.texels_per_m.map_or("-".into(), |n| format!("{n:.1}"));
             out += &format!(
-                "{head:<24}{number:>7}{:>11}{:>10.1}{px:>10}{:>7}{:>12.1}{:>11.1}\n",
+                "{head:<24}{number:>7}{:>11}{:>10.1}{px:>10}{texels:>10}{:>7}{:>12.1}{:>11.1}\n",
                 level.triangles,
                 level.distance_m,
                 if level.needed { "yes" } else { "no" },
@@ -187,13 +119,9 @@ fn table(answer: &Answer, spec: &Spec) -> String {
             );
             head = "";
         }
-        out += &match (species.nearest_m, species.farthest_m) {
-            (Some(near), Some(far)) => format!(
-                "{:<24}{} trees, {:.1} m high, seen from {near:.1} m to {far:.1} m\n",
-                "", species.trees, species.height_m
-            ),
-            _ => format!("{:<24}{} trees, none is ever seen\n", "", species.trees),
-        };
+        for line in told(species) {
+            out += &format!("{:<24}{line}\n", "");
+        }
     }
     let (with, without) = (answer.triangles, answer.triangles_original);
     out += &format!(
@@ -216,18 +144,74 @@ fn table(answer: &Answer, spec: &Spec) -> String {
     if answer.budget_met == Some(false) {
         out += "The budget is too small: even so the worst frame draws more. Ask for more levels, or for fewer trees.\n";
     }
+    let about = |estimated: bool| if estimated { "about " } else { "" };
     out += &format!(
-        "Textures of what is needed: {}{:.0} MB with mips, at {} bytes a texel.\n",
-        if answer.texture_bytes_estimated {
-            "about "
-        } else {
-            ""
-        },
+        "Textures of what is needed: {}{:.0} MB with mips, as {:?}. On disk: {}{:.0} MB.\n",
+        about(answer.texture_bytes_estimated),
         mib(answer.texture_bytes),
-        spec.texel_bytes
+        spec.scene.texture_format,
+        about(answer.disk_bytes_estimated),
+        mib(answer.disk_bytes)
     );
-    if let Some(disk) = answer.disk_bytes {
-        out += &format!("On disk: {:.0} MB.\n", mib(disk));
+    out + &engine(answer, spec)
+}
+
+/// What is told of a species beside its levels.
+fn told(species: &SpeciesAnswer) -> Vec<String> {
+    let (Some(near), Some(far)) = (species.nearest_m, species.farthest_m) else {
+        return vec![format!("{} trees, none is ever seen", species.trees)];
+    };
+    let mut lines = vec![format!(
+        "{} trees, {:.1} m high, seen from {near:.1} m to {far:.1} m",
+        species.trees, species.height_m
+    )];
+    if let (Some([from, to]), Some([low, high])) = (species.azimuths_deg, species.elevations_deg) {
+        let azimuths = match to - from >= 360.0 {
+            true => "all around".into(),
+            false => format!("azimuths {from:.0} to {to:.0}"),
+        };
+        let sides = match species.both_sides {
+            0.0 => "no back side of a card is ever seen".into(),
+            1.0 => "cards are seen from both sides".into(),
+            share => format!(
+                "{:.0} % of upright cards are seen from both sides",
+                100.0 * share
+            ),
+        };
+        lines.push(format!(
+            "levels: {azimuths}, elevations {low:.0} to {high:.0} degrees; {sides}"
+        ));
+        lines.push(format!("maps: {}", species.maps.join("; ")));
     }
-    out
+    if !species.can_share_with.is_empty() {
+        let others = species.can_share_with.join(", ");
+        lines.push(match species.atlas.as_str() {
+            "" => format!("painted as {others}: can share an atlas (say atlas: \"NAME\" of each)"),
+            atlas => format!("painted as {others}; shares the atlas {atlas}"),
+        });
+    } else if !species.atlas.is_empty() {
+        lines.push(format!("shares the atlas {}", species.atlas));
+    }
+    lines
+}
+
+/// What the engine does with it all.
+fn engine(answer: &Answer, spec: &Spec) -> String {
+    let engine = &answer.engine;
+    let mut out = format!(
+        "Engine {:?}: {}",
+        engine.name,
+        match engine.takes {
+            Takes::SingleFiles => "load NAME_LODn.glb, switch at the distances in their extras",
+            Takes::Combined => "load NAME.glb, it switches by MSFT_lod",
+            Takes::Tiles => "load NAME_tileset.json (recipe: hierarchy), it refines by itself",
+        }
+    );
+    if !engine.makes_mips && spec.scene.mips == Mips::Engine {
+        out += "; it makes no mips of PNG: ship them (mips: Shipped)";
+    }
+    if !engine.draws_instances {
+        out += "; it does not draw instances (no --instancing)";
+    }
+    out + ".\n"
 }

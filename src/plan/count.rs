@@ -2,6 +2,7 @@
 
 use super::hidden::Hiding;
 use super::kind::{Kind, Step};
+use super::seen::Seen;
 use super::spec::Spec;
 use crate::runtime::View;
 
@@ -13,6 +14,8 @@ pub struct Frame {
     /// For each kind the nearest and the farthest tree that is seen, metres at scale 1; the nearest
     /// is [`f64::MAX`] where none is.
     pub distances: Vec<[f64; 2]>,
+    /// For each kind from where trees are seen that show a level.
+    pub seen: Vec<Seen>,
     /// Triangles of all trees in view at the levels they show.
     level_triangles: u64,
     /// The same without levels.
@@ -46,6 +49,7 @@ pub fn frame(
     for (kind, ladder) in kinds.iter().zip(ladders) {
         let mut shown = vec![0u64; ladder.len()];
         let mut reach = [f64::MAX, 0.0f64];
+        let mut seen = Seen::default();
         let end_m = kind.end_m(&spec.scene);
         for spot in &kind.spots {
             let (center, radius) = kind.sphere(spot);
@@ -62,6 +66,12 @@ pub fn frame(
             let at = |distance: f64| ladder.partition_point(|s| s.distance_m <= distance) - 1;
             let level = at(distance);
             shown[level] += 1;
+            if level > 0 {
+                let towards = (view.eye - center) / radius;
+                let own = spot.turn.map(|turn| (turn * towards).normalize_or_zero());
+                let own = own.map_or(towards, |direction| direction * towards.length());
+                seen.add(own, spot.turn.is_none());
+            }
             out.level_triangles += ladder[level].triangles;
             let hidden = hiding.probability(center, kind.height_m as f32 * spot.scale);
             if hidden >= HIDDEN {
@@ -75,6 +85,7 @@ pub fn frame(
         }
         out.shown.push(shown);
         out.distances.push(reach);
+        out.seen.push(seen);
     }
     out
 }
@@ -93,12 +104,17 @@ mod tests {
         let spot = |z: f32, scale: f32| Spot {
             foot: Vec3::new(0.0, 0.0, z),
             scale,
+            turn: Some(glam::Mat3::IDENTITY),
         };
         let kind = Kind {
             name: "t".into(),
             input: "t.glb".into(),
             triangles: 1000,
             texture_bytes: 0,
+            file_bytes: 0,
+            paints: Default::default(),
+            is_unlit: false,
+            atlas: String::new(),
             height_m: 10.0,
             center: DVec3::ZERO,
             radius_m: 5.0,
@@ -134,5 +150,9 @@ mod tests {
         // Without a grid nothing is hidden.
         assert_eq!((found.hidden_trees, found.unhidden_triangles), (0, 1210));
         assert_eq!(found.distances, [[10.0, 90.0]]);
+        // All stand in front of the eye, which is in front of them.
+        let sector = found.seen[0].sector().unwrap();
+        assert_eq!(sector.azimuths_deg, [350.0, 370.0]);
+        assert_eq!(sector.elevations_deg, [-10.0, 10.0]);
     }
 }

@@ -96,12 +96,17 @@ mod tests {
         let spot = |i: usize| Spot {
             foot: Vec3::Z * -(10.0 + 5.0 * i as f32),
             scale: 1.0,
+            turn: None,
         };
         Kind {
             name: "t".into(),
             input: "t.glb".into(),
             triangles: 1,
             texture_bytes: 0,
+            file_bytes: 0,
+            paints: Default::default(),
+            is_unlit: false,
+            atlas: String::new(),
             height_m: 6.0,
             center: DVec3::Y * 3.0,
             radius_m: 6.0,

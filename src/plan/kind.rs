@@ -1,5 +1,6 @@
 //! One kind of tree: what the plan has to know of its file, and where its trees stand.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use glam::{DVec3, Vec3};
@@ -7,12 +8,16 @@ use glam::{DVec3, Vec3};
 use super::places::{self, Spot};
 use super::spec::{Spec, Species};
 use crate::botany::load::load;
+use crate::botany::model::{Material, Model};
 use crate::error::{Error, Result};
-use crate::ladder::{LEAST_TRIANGLES, Wanted, rungs};
+use crate::ladder::{LEAST_TRIANGLES, Rung, Wanted, rungs};
+use crate::level::LevelRequest;
+use crate::recipe::Method;
 use crate::report::texture_bytes;
 use crate::runtime::Cells;
 use crate::scene::Scene;
 use crate::solid;
+use crate::space::sha256::sha256;
 
 /// A kind of tree.
 #[derive(Clone, Debug)]
@@ -25,6 +30,14 @@ pub struct Kind {
     pub triangles: u64,
     /// Bytes of the original's textures on the GPU, RGBA8 with mips.
     pub texture_bytes: u64,
+    /// Bytes of the file, without others that it refers to.
+    pub file_bytes: u64,
+    /// What it is painted with: each material's colour and image.
+    pub paints: BTreeSet<String>,
+    /// Whether no light falls on it.
+    pub is_unlit: bool,
+    /// The atlas that the plan says it shares; empty: none.
+    pub atlas: String,
     /// Height, metres.
     pub height_m: f64,
     /// Middle of the bounding sphere in the file's space, and its radius, metres.
@@ -46,6 +59,20 @@ pub struct Step {
     pub height_px: f64,
     /// Most triangles.
     pub triangles: u64,
+}
+
+impl Step {
+    /// Texels that a level's cards have for the height of the tree.
+    pub fn texels_high(&self) -> f64 {
+        let rung = Rung {
+            triangles: self.triangles,
+            height_px: self.height_px,
+            end_px: self.height_px / 2.0,
+        };
+        LevelRequest::of(&rung, Method::default())
+            .height_texels
+            .into()
+    }
 }
 
 impl Kind {
@@ -76,6 +103,10 @@ impl Kind {
             name: model.name.clone(),
             triangles: model.triangles.len() as u64,
             texture_bytes: texture_bytes(&model),
+            file_bytes: std::fs::metadata(&input).map_or(0, |m| m.len()),
+            paints: paints(&model),
+            is_unlit: model.is_unlit(),
+            atlas: species.atlas.clone(),
             height_m: f64::from(model.height()) * model.frame.radius,
             center: model.frame.center,
             radius_m: model.frame.radius,
@@ -123,6 +154,22 @@ impl Kind {
             far => far.min(vanished),
         }
     }
+}
+
+/// Colour and image, by its SHA-256, of each material of a model.
+fn paints(model: &Model) -> BTreeSet<String> {
+    let mut digests = vec![None; model.images.len()];
+    let mut digest = |image: u32| {
+        let pixels = &model.images[image as usize].rgba;
+        digests[image as usize]
+            .get_or_insert_with(|| sha256(pixels))
+            .clone()
+    };
+    let paint = |m: &Material| {
+        let image = m.base_color.map(|t| digest(t.image));
+        format!("{:?} {image:?}", m.base_color_factor)
+    };
+    model.materials.iter().map(paint).collect()
 }
 
 /// Cells along the longest side of a tree of which so many stand in the scene.

@@ -5,24 +5,29 @@
 //! that is more than the budget. These are what an engine without occlusion culling draws; what
 //! trees hide of each other is told beside them.
 
+mod answer;
 mod count;
 mod hidden;
 mod kind;
 mod path;
 mod places;
+mod seen;
+mod shared;
 mod spec;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use rayon::prelude::*;
-use serde::Serialize;
 
 use crate::error::{Error, Result};
+use crate::export::foliage::names;
 use crate::runtime::Cells;
 use crate::scene::Scene;
+pub use answer::{Answer, Cost, EngineAnswer, LevelAnswer, SpeciesAnswer};
 use count::{Frame, frame};
 use hidden::Hiding;
 pub use kind::Kind;
+use seen::Seen;
 pub use spec::{Key, Spec, Species};
 
 /// Most that levels are moved nearer for a budget.
@@ -30,99 +35,17 @@ const NEAREST: f64 = 16.0;
 /// Texels of a level's page over the square of the tree's height in pixels where the level starts:
 /// the feather palm of the README has 8, the sample oak 16. Sides of pages are powers of two.
 const TEXELS_PER_PIXEL: f64 = 12.0;
-/// Base colour, normals, and roughness with metalness and occlusion.
-const MAPS: f64 = 3.0;
+/// Bytes of a level's file over those of its textures, uncompressed: .09 to .13 for the sample oak, an EZ oak and an
+/// instanced maple.
+const FILE_SHARE: f64 = 0.11;
+/// Bytes of a manifest for a triangle of the original: 15 to 65 for these.
+const MANIFEST_BYTES: f64 = 50.0;
+/// Maps of a page; the first alone where nothing is lit.
+const MAPS: [&str; 3] = ["base color", "normal", "occlusion, roughness, metalness"];
 /// All mips over the largest.
 const MIPS: f64 = 4.0 / 3.0;
 /// Distances that the camera comes to are rounded outwards by this share.
 const ROUNDING: f64 = 0.01;
-
-/// What a scene needs and costs.
-#[derive(Clone, Debug, Default, Serialize)]
-pub struct Answer {
-    /// Frames of the path.
-    pub frames: u32,
-    /// Trees that stand in the scene.
-    pub trees: u64,
-    /// How many times nearer than asked levels start, for the budget; their errors are as many times
-    /// as large on the screen. 1: as asked.
-    pub moved_nearer: f64,
-    /// Whether the worst frame keeps the budget; absent where there is none.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub budget_met: Option<bool>,
-    /// Triangles a frame with levels.
-    pub triangles: Cost,
-    /// Triangles a frame with levels where trees that others hide are left out, and what is half hidden
-    /// is drawn coarser.
-    pub triangles_unhidden: Cost,
-    /// Trees in the picture that others hide: with a probability of .99 neither middle nor top is seen.
-    pub hidden_trees: Cost,
-    /// Triangles a frame without: every tree in view as it was modelled.
-    pub triangles_original: Cost,
-    /// Bytes of the textures of all levels that are needed, with mips, on the GPU.
-    pub texture_bytes: u64,
-    /// Whether those of levels are estimated and not read from packages.
-    pub texture_bytes_estimated: bool,
-    /// Bytes of the packages; absent before they are baked.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub disk_bytes: Option<u64>,
-    /// Each kind of tree.
-    pub species: Vec<SpeciesAnswer>,
-}
-
-/// A cost over the frames of the path.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Cost {
-    /// Mean of all frames.
-    pub mean: f64,
-    /// The worst frame.
-    pub worst: u64,
-    /// Which one that is, from 0.
-    pub worst_frame: u32,
-}
-
-/// What one kind of tree needs.
-#[derive(Clone, Debug, Default, Serialize)]
-pub struct SpeciesAnswer {
-    /// The file's stem.
-    pub name: String,
-    /// The file.
-    pub input: PathBuf,
-    /// How many stand in the scene.
-    pub trees: u64,
-    /// Triangles of the original.
-    pub triangles: u64,
-    /// Height at scale 1, metres.
-    pub height_m: f64,
-    /// Nearest that the camera sees one, metres at scale 1 (a tree twice as large counts as half as
-    /// far); absent where none is ever seen.
-    pub nearest_m: Option<f64>,
-    /// Farthest that the camera sees one, metres at scale 1.
-    pub farthest_m: Option<f64>,
-    /// What to bake it with.
-    #[serde(skip)]
-    pub scene: Scene,
-    /// All levels, the original first.
-    pub levels: Vec<LevelAnswer>,
-}
-
-/// What one level is needed for.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct LevelAnswer {
-    /// Where it starts, metres at scale 1.
-    pub distance_m: f64,
-    /// Height of the tree there, pixels; absent for the original.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub height_px: Option<f64>,
-    /// Most triangles.
-    pub triangles: u64,
-    /// Whether any frame shows it.
-    pub needed: bool,
-    /// Trees that show it, over the frames.
-    pub shown: Cost,
-    /// Bytes of its textures on the GPU, with mips.
-    pub texture_bytes: u64,
-}
 
 /// Plans a scene; paths in `spec` are relative to `folder`.
 ///
@@ -163,6 +86,8 @@ pub fn plan(spec: &Spec, folder: &Path) -> Result<Answer> {
         hidden_trees: Cost::over(frames.iter().map(|f| f.hidden_trees)),
         triangles_original: Cost::over(frames.iter().map(|f| f.original_triangles)),
         texture_bytes_estimated: true,
+        disk_bytes_estimated: true,
+        engine: EngineAnswer::of(spec.scene.engine),
         ..Answer::default()
     };
     for (index, kind) in kinds.iter().enumerate() {
@@ -170,8 +95,26 @@ pub fn plan(spec: &Spec, folder: &Path) -> Result<Answer> {
             .species
             .push(species(spec, kind, index, nearer, &frames)?);
     }
+    shared::partners(&kinds, &mut answer.species);
+    let disk = kinds.iter().zip(&answer.species);
+    answer.disk_bytes = disk.map(|(k, s)| disk_bytes(k, s, spec)).sum();
     answer.add_up();
     Ok(answer)
+}
+
+/// About what a package takes: every level is in a file of its own and in the one of all.
+fn disk_bytes(kind: &Kind, answer: &SpeciesAnswer, spec: &Spec) -> u64 {
+    if answer.nearest_m.is_none() {
+        return 0;
+    }
+    let uncompressed = 4.0 / spec.scene.texture_format.texel_bytes();
+    let level = |(number, level): (usize, &LevelAnswer)| match (level.needed, number) {
+        (false, _) => 0.0,
+        (true, 0) => kind.file_bytes as f64,
+        (true, _) => level.texture_bytes as f64 * uncompressed * FILE_SHARE,
+    };
+    let files: f64 = answer.levels.iter().enumerate().map(level).sum();
+    (2.0 * files + MANIFEST_BYTES * kind.triangles as f64) as u64
 }
 
 /// Two species of one name would be baked into one folder, the second over the first.
@@ -228,18 +171,24 @@ fn species(
         .fold(f64::MAX, f64::min);
     let farthest = seen(|f| &f.distances).map(|d| d[1]).fold(0.0, f64::max);
     let ever = nearest < f64::MAX;
+    let mut from = Seen::default();
+    frames.iter().for_each(|f| from.join(&f.seen[index]));
+    let sector = from.sector();
+    let maps = names(spec.scene.lit && !kind.is_unlit).len();
+    let texel_bytes = spec.scene.texture_format.texel_bytes();
     let levels = ladder.iter().enumerate().map(|(level, range)| {
         let shown = Cost::over(frames.iter().map(|f| f.shown[index][level]));
         let texels = TEXELS_PER_PIXEL * range.height_px * range.height_px;
         LevelAnswer {
             distance_m: range.distance_m,
             height_px: (level > 0).then_some(range.height_px),
+            texels_per_m: (level > 0).then(|| range.texels_high() / kind.height_m),
             triangles: range.triangles,
             needed: shown.worst > 0,
             shown,
             texture_bytes: match level {
-                0 => (kind.texture_bytes as f64 / 4.0 * spec.texel_bytes) as u64,
-                _ => (texels * MAPS * MIPS * spec.texel_bytes) as u64,
+                0 => (kind.texture_bytes as f64 / 4.0 * texel_bytes) as u64,
+                _ => (texels * maps as f64 * MIPS * texel_bytes) as u64,
             },
         }
     });
@@ -252,6 +201,12 @@ fn species(
         nearest_m: ever.then_some(nearest),
         farthest_m: ever.then_some(farthest),
         levels: levels.collect(),
+        azimuths_deg: sector.map(|s| s.azimuths_deg),
+        elevations_deg: sector.map(|s| s.elevations_deg),
+        both_sides: sector.map_or(0.0, |s| s.both_sides()),
+        maps: MAPS[..maps].to_vec(),
+        can_share_with: Vec::new(),
+        atlas: kind.atlas.clone(),
         scene: Scene {
             nearest_m: spec.scene.nearest_m.max(nearest * (1.0 - ROUNDING)),
             farthest_m: match farthest * (1.0 + ROUNDING) {
@@ -259,33 +214,14 @@ fn species(
                 far => far,
             },
             heights_px: ladder[1..].iter().map(|l| l.height_px).collect(),
-            ..spec.scene.clone()
+            ..match sector {
+                Some(sector) if !spec.from_all_sides => Scene {
+                    azimuths_deg: sector.azimuths_deg,
+                    elevations_deg: sector.elevations_deg,
+                    ..spec.scene.clone()
+                },
+                _ => spec.scene.clone(),
+            }
         },
     })
-}
-
-impl Answer {
-    /// Sums the textures of levels that are needed.
-    pub fn add_up(&mut self) {
-        let levels = self.species.iter().flat_map(|s| &s.levels);
-        self.texture_bytes = levels.filter(|l| l.needed).map(|l| l.texture_bytes).sum();
-    }
-}
-
-impl Cost {
-    /// Mean and maximum; the first frame of those that are equal.
-    fn over(values: impl Iterator<Item = u64>) -> Self {
-        let mut cost = Self::default();
-        let mut sum = 0.0;
-        let mut count = 0u32;
-        for value in values {
-            if value > cost.worst {
-                (cost.worst, cost.worst_frame) = (value, count);
-            }
-            sum += value as f64;
-            count += 1;
-        }
-        cost.mean = sum / f64::from(count.max(1));
-        cost
-    }
 }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use glam::{DMat4, Vec3};
+use glam::{DMat3, DMat4, Mat3, Vec3};
 
 use crate::botany::load::{self, Limits};
 use crate::error::{Error, Result};
@@ -14,6 +14,8 @@ pub struct Spot {
     pub foot: Vec3,
     /// Uniform.
     pub scale: f32,
+    /// From the scene's directions to the tree's own; `None`: it may be turned any way around its trunk.
+    pub turn: Option<Mat3>,
 }
 
 /// Reads a file of places: text, or a .glb or .gltf whose mesh nodes and instances are trees.
@@ -46,7 +48,12 @@ fn of_meshes(transforms: Vec<DMat4>, file: &Path) -> Result<Vec<Spot>> {
             ));
         }
         if known.insert([foot.x, foot.y, foot.z, scale].map(f32::to_bits)) {
-            out.push(Spot { foot, scale });
+            let turn = DMat3::from_mat4(transform).inverse().as_mat3();
+            out.push(Spot {
+                foot,
+                scale,
+                turn: turn.is_finite().then_some(turn),
+            });
         }
     }
     match out.is_empty() {
@@ -73,7 +80,7 @@ fn parse(text: &str, file: &Path) -> Result<Vec<Spot>> {
                 file,
                 format!("line {}", number + 1),
                 what,
-                "write \"x, y, z\" or \"x, y, z, scale\" in metres",
+                "write \"x, y, z\", \"x, y, z, scale\" or \"x, y, z, scale, turn\" in metres and degrees",
             )
         };
         let number = |field: &str| match field.trim().parse::<f32>() {
@@ -81,13 +88,21 @@ fn parse(text: &str, file: &Path) -> Result<Vec<Spot>> {
             _ => Err(fault(format!("{:?} is not a number", field.trim()))),
         };
         let fields: Vec<f32> = line.split([',', ';']).map(number).collect::<Result<_>>()?;
-        let (foot, scale) = match fields[..] {
-            [x, y, z] => (Vec3::new(x, y, z), 1.0),
-            [x, y, z, scale] if scale > 0.0 => (Vec3::new(x, y, z), scale),
-            [_, _, _, scale] => return Err(fault(format!("a tree can't have the scale {scale}"))),
-            _ => return Err(fault(format!("{} numbers", fields.len()))),
-        };
-        out.push(Spot { foot, scale });
+        let (&[x, y, z], more) = fields
+            .split_first_chunk()
+            .filter(|(_, more)| more.len() <= 2)
+            .ok_or_else(|| fault(format!("{} numbers", fields.len())))?;
+        let scale = more.first().copied().unwrap_or(1.0);
+        if scale <= 0.0 {
+            return Err(fault(format!("a tree can't have the scale {scale}")));
+        }
+        out.push(Spot {
+            foot: Vec3::new(x, y, z),
+            scale,
+            turn: more
+                .get(1)
+                .map(|deg| Mat3::from_rotation_y(-deg.to_radians())),
+        });
     }
     match out.is_empty() {
         true => Err(Error::input(
@@ -113,6 +128,7 @@ pub fn strewn(count: u32, region_m: f64, species: usize) -> Vec<Spot> {
         .map(|i| Spot {
             foot: Vec3::new(along(i, 0) as f32, 0.0, along(i, 1) as f32),
             scale: 1.0,
+            turn: None,
         })
         .collect()
 }
@@ -124,15 +140,20 @@ mod tests {
     #[test]
     fn places_are_read_and_faults_named_by_line() {
         let file = Path::new("birch.csv");
-        let text = "x,y,z,scale\n1, 2, 3\n\n# west\n-4;0;5.5;0.5\n";
+        let text = "x,y,z,scale\n1, 2, 3\n\n# west\n-4;0;5.5;0.5\n0,0,0,2,90\n";
         let spots = parse(text, file).unwrap();
-        assert_eq!(spots.len(), 2);
+        assert_eq!(spots.len(), 3);
+        assert!(spots[0].turn.is_none() && spots[1].turn.is_none());
+        // Turned by 90 degrees, its own z looks along the scene's x.
+        let own = spots[2].turn.unwrap() * Vec3::X;
+        assert!(own.abs_diff_eq(Vec3::Z, 1e-6), "{own}");
         assert_eq!(spots[1].foot, Vec3::new(-4.0, 0.0, 5.5));
         assert_eq!((spots[0].scale, spots[1].scale), (1.0, 0.5));
         for (text, place) in [
             ("1,2,3\n1,2", "line 2"),
             ("1,2,3\n1,2,inf", "line 2"),
             ("1,2,3,-1", "line 1"),
+            ("1,2,3,1,0,0", "6 numbers"),
             ("1,2,3\nx,y,z", "line 2"),
             ("# nothing", "no place"),
         ] {

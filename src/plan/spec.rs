@@ -30,8 +30,8 @@ pub struct Spec {
     /// Triangles that the worst frame may draw; default 0: no limit. Where the levels draw more, all
     /// of them are moved nearer.
     pub triangles_per_frame: u64,
-    /// Bytes that a texel takes on the GPU, 0.25 to 16: 4 for RGBA8 (default), 1 for BC7 or ASTC 4x4.
-    pub texel_bytes: f64,
+    /// Whether levels are fitted for all directions, not only for those from which the path shows them; default false.
+    pub from_all_sides: bool,
 }
 
 /// One kind of tree.
@@ -42,10 +42,13 @@ pub struct Species {
     pub input: PathBuf,
     /// Trees that are strewn over the region, where no places are given.
     pub count: u32,
-    /// A file of places: a line a tree, "x, y, z" or "x, y, z, scale", metres; a head line and lines
-    /// that begin with # are passed over. Or a .glb or .gltf: each node with a mesh, and each instance of
+    /// A file of places: a line a tree, "x, y, z", "x, y, z, scale" or "x, y, z, scale, turn", metres and degrees around
+    /// y (without it a tree may be turned any way); a head line and lines that begin with # are passed over. Or a .glb or .gltf: each node with a mesh, and each instance of
     /// EXT_mesh_gpu_instancing, is a tree; what the mesh is does not matter.
     pub places: Option<PathBuf>,
+    /// The atlas that its levels share with those of other species that name it: all of them are baked into one package
+    /// of this name. Default: none.
+    pub atlas: String,
 }
 
 /// A point of the camera's path.
@@ -68,7 +71,7 @@ impl Default for Spec {
             frames: 120,
             levels: 4,
             triangles_per_frame: 0,
-            texel_bytes: 4.0,
+            from_all_sides: false,
         }
     }
 }
@@ -81,7 +84,6 @@ impl Knobs for Spec {
             Range::of("region_m", self.region_m, 1.0, 100_000.0),
             Range::of("frames", self.frames, 1.0, 100_000.0),
             Range::of("levels", self.levels, 1.0, 12.0),
-            Range::of("texel_bytes", self.texel_bytes, 0.25, 16.0),
         ];
         out.extend(self.scene.ranges());
         let counts = self.species.iter().map(|s| f64::from(s.count));
