@@ -20,7 +20,7 @@ pub use crate::provenance::provenance;
 use crate::report::schema::Report;
 use crate::report::{Cuts, Judged, Recognised, Settings, heights, judge};
 pub use crate::request::Request;
-use crate::scene::Scene;
+use crate::scene::{Mips, Scene};
 use crate::sharing;
 use crate::space::view::Lens;
 use crate::verdict::{REFUSED, in_band, refusal};
@@ -70,7 +70,7 @@ fn made(request: &Request, watch: &dyn Watch) -> Result<Baked> {
         candidates,
     } = levels(request, &tree, &rungs, &ranges, watch)?;
     begin(watch, "write", packed.len() as u64 + 1)?;
-    let mut files = write(&package, &tree, &packed, watch)?;
+    let mut files = write(&package, &tree, &packed, &request.scene, watch)?;
     let shares = sheets(&package, &packed[1..], shares, &mut files)?;
     let instancing = match request.recipe.instancing {
         true if packed[0].shown => {
@@ -98,6 +98,7 @@ fn made(request: &Request, watch: &dyn Watch) -> Result<Baked> {
     let report = judge(measured, &judged, &settings(&request.scene), || step(watch))?;
     let sharing = sharing::told(&report, shares);
     let mut warnings = levels.tree.warnings.clone();
+    warnings.extend(not_done_by(&request.scene, request.recipe.instancing));
     if request.recipe.sharing > 0.0 {
         warnings.extend(sharing::kept(&sharing, request.recipe.sharing));
     }
@@ -262,6 +263,24 @@ pub fn pixels(height: f64) -> u32 {
 /// The lens of the screen that a scene states distances for.
 pub fn lens(scene: &Scene) -> Lens {
     Lens::of_screen(scene.screen_height_px.into(), scene.fov_deg)
+}
+
+/// What the engine that a scene names will not do with the package.
+fn not_done_by(scene: &Scene, instancing: bool) -> Vec<String> {
+    let engine = scene.engine;
+    let mut out = Vec::new();
+    if !engine.makes_mips() && scene.mips == Mips::Engine {
+        out.push(format!(
+            "{engine:?} makes no mips of the PNGs in a file that it loads: crowns flicker from afar; ship them (scene: mips: \
+             Shipped)"
+        ));
+    }
+    if instancing && !engine.draws_instances() {
+        out.push(format!(
+            "{engine:?} does not draw instances: it will refuse the instanced file, or show one leaf of each kind"
+        ));
+    }
+    out
 }
 
 /// The views of the report.

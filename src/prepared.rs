@@ -10,12 +10,13 @@ use crate::detail::wood::Wood;
 use crate::error::Result;
 use crate::export::manifest::{Provenance, Range};
 use crate::export::original::Original;
+use crate::export::shipped::not_shipped;
 use crate::ladder::{LEAST_TRIANGLES, Rung, ranges, rungs, seen};
 use crate::level::{Baker, MASK_HEIGHT};
 use crate::provenance::{check_name, provenance};
 use crate::recipe::{Method, Recipe};
 use crate::request::Request;
-use crate::scene::Scene;
+use crate::scene::{Mips, Scene};
 use crate::watch::{Watch, begin};
 
 /// A tree that was recognised, and which levels it gets.
@@ -38,6 +39,10 @@ impl Prepared {
     /// Those of reading, and [`Error::Usage`](crate::error::Error::Usage) where its levels can't be.
     pub fn new(request: &Request, watch: &dyn Watch) -> Result<Self> {
         check_name(&request.input)?;
+        let (mips, format) = (request.scene.mips, request.scene.texture_format);
+        if mips == Mips::Shipped && !format.can_be_shipped() {
+            return Err(not_shipped(format));
+        }
         begin(watch, "load", 1)?;
         // Read once, so that what is described is what is baked (files that it refers to are read twice).
         let limits = &request.recipe.limits;

@@ -58,8 +58,9 @@ pub enum Mips {
     /// The engine, of the PNGs in the files, by a box filter.
     #[default]
     Engine,
-    /// The bake: each image beside its level as a DDS file with all mips in the scene's texture format, in which as
-    /// many texels pass the alpha test as in the image.
+    /// The bake: each image beside its level as a DDS file with all mips in the scene's texture format. Leaves of the
+    /// original pass the alpha test as often as in the image; pages of cards have the mips that their level was
+    /// matched with.
     Shipped,
 }
 

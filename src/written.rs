@@ -2,16 +2,20 @@
 
 use std::sync::Arc;
 
+use rayon::prelude::*;
 use serde_json::Value;
 
+use crate::botany::model::Image;
 use crate::botany::tree::Tree;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::export::combined::{Packed, write_combined};
 use crate::export::gltf::write_glb;
 use crate::export::manifest::SUFFIX;
 use crate::export::package::Package;
 use crate::export::png::encode_images;
+use crate::export::shipped::{Role, roles, to_dds};
 use crate::report::schema::SharedLevel;
+use crate::scene::{Mips, Scene, TextureFormat};
 use crate::watch::{Watch, step};
 
 /// What a level shares, and the contact sheet of it.
@@ -34,6 +38,7 @@ pub fn write(
     package: &Package,
     tree: &Tree,
     packed: &[Packed],
+    scene: &Scene,
     watch: &dyn Watch,
 ) -> Result<Vec<String>> {
     let frame = &tree.model.frame;
@@ -44,6 +49,9 @@ pub fn write(
         let bytes = write_glb(&level.name, &level.scene, &level.pngs, frame, extras)?;
         package.write(&file, &bytes)?;
         files.push(file);
+        if scene.mips == Mips::Shipped {
+            ship(package, level, scene.texture_format, &mut files)?;
+        }
         step(watch)?;
     }
     let all = format!("{}.glb", tree.model.name);
@@ -51,6 +59,48 @@ pub fn write(
     files.extend([all, "report.json".into(), tree.model.name.clone() + SUFFIX]);
     step(watch)?;
     Ok(files)
+}
+
+/// Writes each image of a level with its mips.
+fn ship(
+    package: &Package,
+    level: &Packed,
+    format: TextureFormat,
+    files: &mut Vec<String>,
+) -> Result<()> {
+    let (images, pngs) = (&level.scene.images, &level.pngs);
+    let encode = |((image, png), role): ((&Image, &Vec<u8>), Role)| {
+        // The level's pixels are gone by now.
+        let decoded = image::load_from_memory(png).map_err(|e| Error::Internal {
+            step: "read PNG back",
+            what: e.to_string(),
+        })?;
+        let decoded = Image {
+            rgba: Arc::new(decoded.into_rgba8().into_raw()),
+            ..image.clone()
+        };
+        to_dds(&decoded, role, format)
+    };
+    let all = images.par_iter().zip(pngs).zip(roles(&level.scene));
+    let encoded: Vec<Vec<u8>> = all.map(encode).collect::<Result<_>>()?;
+    for (number, (image, bytes)) in images.iter().zip(encoded).enumerate() {
+        let file = format!("{}_image{number}{}.dds", level.name, suffix(&image.name));
+        package.write(&file, &bytes)?;
+        files.push(file);
+    }
+    Ok(())
+}
+
+/// What of an image's name goes into a file's.
+fn suffix(name: &str) -> String {
+    let plain = name
+        .chars()
+        .filter(|c| c.is_ascii_alphanumeric() || *c == '_');
+    let plain: String = plain.take(40).collect();
+    match plain.is_empty() {
+        true => plain,
+        false => format!("_{plain}"),
+    }
 }
 
 /// Writes the contact sheets of what levels share.

@@ -25,6 +25,7 @@ pub mod png;
 pub mod project;
 pub mod refine;
 pub mod share;
+pub mod shipped;
 pub mod sides;
 pub mod surface;
 pub mod tangent;

@@ -22,7 +22,7 @@ use rayon::prelude::*;
 use crate::error::{Error, Result};
 use crate::export::foliage::names;
 use crate::runtime::Cells;
-use crate::scene::Scene;
+use crate::scene::{Mips, Scene};
 pub use answer::{Answer, Cost, EngineAnswer, LevelAnswer, SpeciesAnswer};
 use count::{Frame, frame};
 use hidden::Hiding;
@@ -114,7 +114,12 @@ fn disk_bytes(kind: &Kind, answer: &SpeciesAnswer, spec: &Spec) -> u64 {
         (true, _) => level.texture_bytes as f64 * uncompressed * FILE_SHARE,
     };
     let files: f64 = answer.levels.iter().enumerate().map(level).sum();
-    (2.0 * files + MANIFEST_BYTES * kind.triangles as f64) as u64
+    let needed = answer.levels.iter().filter(|l| l.needed);
+    let shipped: u64 = match spec.scene.mips {
+        Mips::Engine => 0,
+        Mips::Shipped => needed.map(|l| l.texture_bytes).sum(),
+    };
+    (2.0 * files + MANIFEST_BYTES * kind.triangles as f64) as u64 + shipped
 }
 
 /// Two species of one name would be baked into one folder, the second over the first.

@@ -7,6 +7,8 @@ use crate::space::sector::Sector;
 /// Azimuths are kept apart in sectors of so many degrees.
 const BIN_DEG: f32 = 5.0;
 const BINS: usize = 72;
+/// What elevations may be off by, degrees.
+const ROUNDING_DEG: f32 = 0.01;
 /// A gap in the azimuths that is narrower than this is none, degrees: trees are seen from all around.
 const LEAST_GAP_DEG: f32 = 60.0;
 
@@ -68,13 +70,14 @@ impl Seen {
         if self.azimuths == 0 || low > high {
             return None;
         }
-        let rounded = |deg: f32| (deg / BIN_DEG).clamp(-18.0, 18.0) * BIN_DEG;
+        // What is a hair over a step is rounding.
+        let (low, high) = (
+            (low + ROUNDING_DEG) / BIN_DEG,
+            (high - ROUNDING_DEG) / BIN_DEG,
+        );
         Some(Sector {
             azimuths_deg: self.arc(),
-            elevations_deg: [
-                rounded((low / BIN_DEG).floor() * BIN_DEG),
-                rounded((high / BIN_DEG).ceil() * BIN_DEG),
-            ],
+            elevations_deg: [low.floor() * BIN_DEG, high.ceil() * BIN_DEG],
         })
     }
 

@@ -11,15 +11,18 @@ use crate::export::gltf::write_linked;
 use crate::export::manifest::SUFFIX;
 use crate::export::package::Package;
 use crate::export::png::encode_png;
+use crate::export::shipped::{Role, roles, to_dds};
 use crate::levels::Levels;
 use crate::prepared::Prepared;
 use crate::report::species::SpeciesReport;
+use crate::scene::{Mips, Scene};
 use crate::space::sha256::sha256;
 
 /// What was written so far.
 pub struct Files<'a> {
     package: &'a Package,
     species: &'a str,
+    scene: &'a Scene,
     /// Names in the order in which they were written.
     pub names: Vec<String>,
     /// The file of each image, by its SHA-256.
@@ -48,10 +51,11 @@ pub fn to_json(report: &SpeciesReport) -> Result<String> {
 
 impl<'a> Files<'a> {
     /// None yet.
-    pub fn new(package: &'a Package, species: &'a str) -> Self {
+    pub fn new(package: &'a Package, species: &'a str, scene: &'a Scene) -> Self {
         Self {
             package,
             species,
+            scene,
             names: Vec::new(),
             images: BTreeMap::new(),
             plain: 0,
@@ -77,6 +81,7 @@ impl<'a> Files<'a> {
         let mut known: Vec<(Image, String)> = Vec::new();
         levels.retain(|level| level.shown);
         for level in &mut levels {
+            let roles = roles(&level.scene);
             let first = first_of_page(&level.scene.images);
             let mut uris = Vec::with_capacity(level.scene.images.len());
             for (i, image) in level.scene.images.iter().enumerate() {
@@ -85,7 +90,7 @@ impl<'a> Files<'a> {
                     Some((_, uri)) => uri.clone(),
                     None => {
                         let of_page = page.filter(|_| first.is_some_and(|first| i >= first));
-                        let uri = self.image(of_page, image)?;
+                        let uri = self.image(of_page, image, roles[i])?;
                         known.push((image.clone(), uri.clone()));
                         uri
                     }
@@ -103,7 +108,7 @@ impl<'a> Files<'a> {
     }
 
     /// The file of an image, written if no other holds the same.
-    fn image(&mut self, page: Option<usize>, image: &Image) -> Result<String> {
+    fn image(&mut self, page: Option<usize>, image: &Image, role: Role) -> Result<String> {
         let png = encode_png(image)?;
         let digest = sha256(&png);
         if let Some(uri) = self.images.get(&digest) {
@@ -117,6 +122,10 @@ impl<'a> Files<'a> {
             }
         };
         self.put(uri.clone(), &png)?;
+        if self.scene.mips == Mips::Shipped {
+            let file = uri.trim_end_matches("png").to_owned() + "dds";
+            self.put(file, &to_dds(image, role, self.scene.texture_format)?)?;
+        }
         self.images.insert(digest, uri.clone());
         Ok(uri)
     }

@@ -98,7 +98,7 @@ fn made(species: &Species, watch: &dyn Watch) -> Result<BakedSpecies> {
     let mut levels: Vec<Levels> = all
         .map(|((request, t), p)| Levels::new(request, &t.tree, &p.elements, &t.ranges))
         .collect();
-    let mut files = Files::new(&package, &name);
+    let mut files = Files::new(&package, &name, &species.request.scene);
     let pages = bake_pages(
         &mut levels,
         &trees,
