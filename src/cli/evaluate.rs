@@ -3,12 +3,13 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use super::evaluate_folder::Evaluated;
+use super::evaluate_folder::{Evaluated, file_name};
 use super::out::print;
 use super::progress::{Bars, catch_ctrl_c};
 use crate::botany::Model;
 use crate::botany::load::load;
-use crate::error::{Error, Result};
+use crate::error::Result;
+use crate::pipeline::to_json;
 use crate::report::schema::{Figure, Level, Report, SizeFigures};
 use crate::report::{Cuts, Settings, Start, evaluate_watched, start};
 use crate::space::view::Lens;
@@ -150,20 +151,6 @@ fn split(levels: &[String]) -> (Vec<PathBuf>, Vec<Option<u32>>) {
         }
     }
     (files, heights)
-}
-
-pub(super) fn file_name(file: &Path) -> String {
-    file.file_name()
-        .unwrap_or(file.as_os_str())
-        .to_string_lossy()
-        .into_owned()
-}
-
-pub(super) fn to_json(report: &Report) -> Result<String> {
-    serde_json::to_string_pretty(report).map_err(|error| Error::Internal {
-        step: "report",
-        what: error.to_string(),
-    })
 }
 
 /// The report for people: one line a level and size.

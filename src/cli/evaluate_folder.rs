@@ -5,12 +5,11 @@ use std::time::Instant;
 
 use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 
-use super::evaluate::{file_name, to_json};
 use crate::botany::Model;
 use crate::botany::load::load;
 use crate::botany::recognise::{RecogniseOptions, recognise};
 use crate::error::{Error, Result};
-use crate::pipeline::recognised;
+use crate::pipeline::{recognised, to_json};
 use crate::report::schema::{Bake, Report};
 use crate::report::{Content, Made, Recognised, Settings, contact_sheet};
 use crate::space::raster::Sampling;
@@ -127,4 +126,12 @@ fn recognised_in(original: &Path) -> Result<Vec<Recognised>> {
         Err(Error::Input { .. }) => Ok(Vec::new()),
         Err(error) => Err(error),
     }
+}
+
+/// The last part of a path.
+pub(super) fn file_name(file: &Path) -> String {
+    file.file_name()
+        .unwrap_or(file.as_os_str())
+        .to_string_lossy()
+        .into_owned()
 }

@@ -8,13 +8,12 @@ use std::path::Path;
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
-use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use super::manifest_tiles::Tiles;
 use crate::error::{Error, Result};
 use crate::recipe::Recipe;
-use crate::runtime::{self, Hierarchy, Measured, OwnLeaves};
+use crate::runtime::Measured;
 use crate::scene::Scene;
 
 /// What a manifest's name ends with.
@@ -256,83 +255,6 @@ impl Manifest {
             what: e.to_string(),
         })?;
         Ok(text + "\n")
-    }
-
-    /// Reads a manifest's text.
-    ///
-    /// # Errors
-    /// [`Error::Input`] with line and column where the text is no manifest (cut off, a key missing), with
-    /// the version where that is another one, and with the field where a number is not finite or a
-    /// sub-tree is missing.
-    pub fn from_ron(text: &str, file: &Path) -> Result<Self> {
-        #[derive(Deserialize)]
-        struct Header {
-            format: String,
-            version: u32,
-        }
-        let fail =
-            |place: String, what: String| Error::input(file, place, what, "bake the package again");
-        let syntax = |e: ron::error::SpannedError| {
-            let at = e.span.start;
-            let place = format!("line {}, column {}", at.line, at.col);
-            fail(place, e.code.to_string())
-        };
-        // Another version may lack keys: it is told from the header, before anything else is read.
-        let header: Header = ron::from_str(text).map_err(syntax)?;
-        if header.format != FORMAT || header.version != VERSION {
-            let what = format!(
-                "this is {:?} version {}, not {FORMAT:?} version {VERSION}",
-                header.format, header.version
-            );
-            return Err(fail("version".into(), what));
-        }
-        let read: Self = ron::from_str(text).map_err(syntax)?;
-        match super::manifest_check::flaw(&read) {
-            Some((place, what)) => Err(fail(place, what)),
-            None => Ok(read),
-        }
-    }
-
-    /// The sub-trees in the form that cuts are made through: they switch at their optimal distances.
-    ///
-    /// # Errors
-    /// [`Error::Internal`]: what [`Manifest::from_ron`] has read has no flaw.
-    pub fn hierarchy(&self) -> Result<Hierarchy> {
-        let own = |o: &Own| OwnLeaves {
-            center: Vec3::from_array(o.center),
-            radius: o.radius_m,
-            switch_distance: o.optimal_distance_m,
-        };
-        let subtree = |s: &Subtree| runtime::Subtree {
-            parent: s.parent,
-            center: Vec3::from_array(s.center),
-            radius: s.radius_m,
-            leaves: s.leaves,
-            switch_distance: s.optimal_distance_m,
-            branch: Vec3::from_array(s.branch),
-            density: s.density,
-            own: s.own.as_ref().map(own),
-        };
-        let list: Vec<runtime::Subtree> = self.subtrees.iter().map(subtree).collect();
-        Hierarchy::new(&list).map_err(|flaw| Error::Internal {
-            step: "order sub-trees",
-            what: flaw.to_string(),
-        })
-    }
-
-    /// What was measured of every sub-tree, by its index; `None` where nothing was.
-    ///
-    /// # Errors
-    /// [`Error::Internal`]: what [`Manifest::from_ron`] has read has no flaw.
-    pub fn measured(&self) -> Result<Option<Measured>> {
-        let Some(visibility) = &self.visibility else {
-            return Ok(None);
-        };
-        let measured = visibility.measured(self.subtrees.len());
-        measured.map(Some).map_err(|what| Error::Internal {
-            step: "read visibility",
-            what,
-        })
     }
 
     /// The files that a manifest of any version lists; `None` where it is none of ours.

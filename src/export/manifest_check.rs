@@ -1,9 +1,51 @@
-//! What a manifest must hold to be worked with: finite numbers, and sub-trees that are there.
+//! Reads a manifest, and checks that it can be worked with: finite numbers, and sub-trees that are there.
 
-use super::manifest::{Card, Level, Manifest, Subtree};
+use std::path::Path;
+
+use serde::Deserialize;
+
+use super::manifest::{Card, FORMAT, Level, Manifest, Subtree, VERSION};
+use crate::error::{Error, Result};
+
+impl Manifest {
+    /// Reads a manifest's text.
+    ///
+    /// # Errors
+    /// [`Error::Input`] with line and column where the text is no manifest (cut off, a key missing), with
+    /// the version where that is another one, and with the field where a number is not finite or a
+    /// sub-tree is missing.
+    pub fn from_ron(text: &str, file: &Path) -> Result<Self> {
+        #[derive(Deserialize)]
+        struct Header {
+            format: String,
+            version: u32,
+        }
+        let fail =
+            |place: String, what: String| Error::input(file, place, what, "bake the package again");
+        let syntax = |e: ron::error::SpannedError| {
+            let at = e.span.start;
+            let place = format!("line {}, column {}", at.line, at.col);
+            fail(place, e.code.to_string())
+        };
+        // Another version may lack keys: it is told from the header, before anything else is read.
+        let header: Header = ron::from_str(text).map_err(syntax)?;
+        if header.format != FORMAT || header.version != VERSION {
+            let what = format!(
+                "this is {:?} version {}, not {FORMAT:?} version {VERSION}",
+                header.format, header.version
+            );
+            return Err(fail("version".into(), what));
+        }
+        let read: Self = ron::from_str(text).map_err(syntax)?;
+        match flaw(&read) {
+            Some((place, what)) => Err(fail(place, what)),
+            None => Ok(read),
+        }
+    }
+}
 
 /// The first flaw: its field and what is wrong.
-pub(super) fn flaw(manifest: &Manifest) -> Option<(String, String)> {
+fn flaw(manifest: &Manifest) -> Option<(String, String)> {
     let tree = &manifest.tree;
     let numbers = [
         ("tree.height_m", tree.height_m),

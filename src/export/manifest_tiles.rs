@@ -1,12 +1,6 @@
 //! What the manifest says of the hierarchy as it is written (`bake --hierarchy`).
 
-use glam::Vec3;
 use serde::{Deserialize, Serialize};
-
-use crate::error::{Error, Result};
-use crate::runtime::{self, Hierarchy};
-
-use super::manifest::Manifest;
 
 /// The hierarchy's files, and its tiles.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -24,7 +18,7 @@ pub struct Tiles {
 /// A sub-tree that cuts may use, or some of what a sub-tree bears itself.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Tile {
-    /// Index into [`Manifest::subtrees`].
+    /// Index into [`Manifest::subtrees`](super::manifest::Manifest::subtrees).
     pub subtree: u32,
     /// All of that sub-tree; else leaves and wood of its own branch, and twigs too small to be tiles.
     pub whole: bool,
@@ -85,32 +79,6 @@ pub struct Geometry {
 }
 
 impl Tiles {
-    /// The tiles in the form that cuts are made through, with branch directions and densities of
-    /// `subtrees`: node `i` of a cut's list stands for the tile in [`Hierarchy::origins`].
-    ///
-    /// # Errors
-    /// [`Error::Internal`]: what [`Manifest::from_ron`] has read has no flaw.
-    pub fn hierarchy(&self, manifest: &Manifest) -> Result<Hierarchy> {
-        let subtree = |t: &Tile| {
-            let of = &manifest.subtrees[t.subtree as usize];
-            runtime::Subtree {
-                parent: t.parent,
-                center: Vec3::from_array(t.center),
-                radius: t.radius_m,
-                leaves: t.leaves,
-                switch_distance: t.switch_distance_m,
-                branch: Vec3::from_array(of.branch),
-                density: of.density,
-                own: None,
-            }
-        };
-        let list: Vec<_> = self.list.iter().map(subtree).collect();
-        Hierarchy::new(&list).map_err(|flaw| Error::Internal {
-            step: "order tiles",
-            what: flaw.to_string(),
-        })
-    }
-
     /// The first flaw: its field and what is wrong; there are so many sub-trees.
     pub(super) fn flaw(&self, subtrees: usize) -> Option<(String, String)> {
         if self.list.is_empty() {

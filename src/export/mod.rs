@@ -16,6 +16,7 @@ mod leftovers;
 pub mod level_scene;
 pub mod manifest;
 mod manifest_check;
+mod manifest_cuts;
 pub mod manifest_tiles;
 pub mod matching;
 pub mod mip;

@@ -4,9 +4,10 @@ use std::convert::Infallible;
 
 use rayon::prelude::*;
 
+use super::asked::Asked;
 use super::cost::{draw_calls, texture_bytes};
 use super::drawable::Drawable;
-use super::measure::{Asked, actors, measure};
+use super::measure::{actors, measure};
 use super::schema::{Level, Report};
 use crate::botany::Model;
 use crate::space::raster::{Sampling, coverage_with_stats};

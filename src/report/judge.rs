@@ -2,8 +2,9 @@
 
 use std::convert::Infallible;
 
+use super::asked::Asked;
 use super::evaluate::{Settings, rows};
-use super::measure::{Asked, actors, measure};
+use super::measure::{actors, measure};
 use super::schema::Report;
 use crate::botany::Model;
 use crate::error::Result;

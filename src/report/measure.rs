@@ -5,36 +5,11 @@
 
 use rayon::prelude::*;
 
+use super::asked::Asked;
 use super::outline::{Outline, summary};
 use super::schema::{Appearance, Change, Figure, Jump, Orbit, SizeFigures, ViewAppearance};
 use super::stage::Actor;
 use super::stand::{Leap, OfSize, OfView, STEP_DEG, Stand};
-use crate::botany::Model;
-use crate::space::view::{Lens, View};
-
-/// What is to be measured.
-pub struct Asked<'a> {
-    /// The original.
-    pub original: &'a Model,
-    /// Its levels, nearest first.
-    pub levels: &'a [&'a Model],
-    /// From where.
-    pub views: &'a [View],
-    /// Through what.
-    pub lens: Lens,
-    /// For each level its sizes: heights of the tree in pixels.
-    pub heights_px: &'a [Vec<u32>],
-    /// Heights at which the original has figures, too.
-    pub original_px: &'a [u32],
-    /// For each level the height from which it is shown, where jumps and orbits are wanted.
-    pub starts_px: &'a [u32],
-    /// Whether colours, depths and normals are compared, not silhouettes alone.
-    pub looks: bool,
-    /// Whether everything is also drawn as an engine does.
-    pub client: bool,
-    /// Whether the base colours of that are wanted.
-    pub base_colors: bool,
-}
 
 /// What was found of one model.
 #[derive(Default)]

@@ -3,10 +3,12 @@
 //! What is measured is what was written: files are loaded again and drawn over the original's
 //! pictures, supersampled and as an engine draws them.
 
+mod asked;
 pub mod band;
 mod contact;
 mod cost;
 mod cuts;
+mod cuts_beside;
 mod drawable;
 mod evaluate;
 mod flip;

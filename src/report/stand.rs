@@ -1,7 +1,7 @@
 //! Everything that is seen from one view: the original, drawn once at each size and kept while all
 //! levels pass by.
 
-use super::measure::Asked;
+use super::asked::Asked;
 use super::outline::Outline;
 use super::schema::ViewAppearance;
 use super::shot::Shot;

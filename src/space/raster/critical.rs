@@ -9,10 +9,10 @@
 //! texels below it as good as holes, and most fragments are passed over.
 
 use super::bits::BitTiles;
+use super::blocks::BLOCK;
 use super::edges::{Edges, Reached, TILE, each_tile};
 use super::patch::Patch;
 use super::seen::{may_reach, seen};
-use super::texture::BLOCK;
 use super::triangle::CENTER;
 use super::{Camera, Mask, Mips, Sampling, Scene};
 

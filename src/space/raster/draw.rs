@@ -1,11 +1,8 @@
 //! The nearest triangle of every sample.
 
-use super::front::Front;
+use super::front::{EMPTY, Front};
 use super::pane::Panes;
 use super::{Camera, Sampling, Scene};
-
-/// The triangle of a sample that nothing hits.
-pub const EMPTY: u32 = u32::MAX;
 
 /// An item buffer: for every sample the triangle that is seen there.
 #[derive(Clone, Debug)]

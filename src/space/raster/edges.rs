@@ -216,7 +216,8 @@ fn each<const SIDE: i32, const N: usize>(edges: &[Edge<N>; 3]) -> u64 {
 mod tests {
     use super::*;
     use crate::space::raster::pane::Pane;
-    use crate::space::raster::triangle::{CENTER, reach};
+    use crate::space::raster::pane::reach;
+    use crate::space::raster::triangle::CENTER;
 
     /// Places as four samples of a pixel have them.
     const FOUR: [[i32; 2]; 4] = [[96, 32], [224, 96], [32, 160], [160, 224]];

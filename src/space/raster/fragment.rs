@@ -2,8 +2,9 @@
 
 use super::camera::{Corner, SUBSAMPLES};
 use super::edges::TILE;
+use super::level::{Address, UNIT};
 use super::patch::Patch;
-use super::texture::{Address, Texture, UNIT};
+use super::texture::Texture;
 use super::triangle::{Plane, Triangle};
 use super::{Material, Mips, Sampling, Scene};
 

@@ -7,12 +7,14 @@
 use wide::f32x4;
 
 use super::camera::Corner;
-use super::draw::EMPTY;
 use super::edges::{Edges, Reached, TILE, each_tile};
 use super::pane::Pane;
 use super::seen::{Seen, may_reach, seen};
 use super::triangle::{CENTER, Plane};
 use super::{Sampling, Scene};
+
+/// The triangle of a sample that nothing hits.
+pub const EMPTY: u32 = u32::MAX;
 
 /// A tile is looked at again after so many triangles.
 const PATIENCE: u16 = 8;

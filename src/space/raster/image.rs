@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::shade::srgb_from_linear;
+use super::srgb::srgb_from_linear;
 
 /// Pixels of a shaded drawing, rows from the top.
 #[derive(Clone, Debug)]

@@ -2,8 +2,7 @@
 
 use glam::{Vec2, Vec3};
 
-use super::draw::EMPTY;
-use super::front::Front;
+use super::front::{EMPTY, Front};
 use super::pane::Panes;
 use super::relief::Relief;
 use super::shade::Light;

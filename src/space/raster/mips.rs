@@ -2,12 +2,8 @@
 
 use std::sync::LazyLock;
 
-use super::shade::{linear_from_srgb, srgb_from_linear};
-use super::texture::Level;
-
-/// Linear light of an sRGB byte.
-static DECODE: LazyLock<[f32; 256]> =
-    LazyLock::new(|| std::array::from_fn(|i| linear_from_srgb(i as f32 / 255.0)));
+use super::level::Level;
+use super::srgb::{light, srgb_from_linear};
 
 /// sRGB byte of linear light in 4096 steps of its square root (fine where sRGB is steep).
 static ENCODE: LazyLock<Vec<u8>> = LazyLock::new(|| {
@@ -17,11 +13,6 @@ static ENCODE: LazyLock<Vec<u8>> = LazyLock::new(|| {
     };
     (0..4096).map(encode).collect()
 });
-
-/// Linear light of an sRGB byte.
-pub(super) fn light(byte: u8) -> f32 {
-    DECODE[byte as usize]
-}
 
 /// The next coarser level: half the size, rounded down, at least one texel.
 pub(super) fn halved(finer: &Level) -> Level {

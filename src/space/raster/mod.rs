@@ -27,6 +27,7 @@ mod fragment;
 mod front;
 mod image;
 mod layers;
+mod level;
 mod mips;
 mod msaa;
 mod pane;
@@ -35,19 +36,23 @@ mod relief;
 mod seen;
 mod shade;
 mod shader;
+mod srgb;
 mod texture;
 mod triangle;
 
 pub use camera::{Camera, Placement};
 pub use coverage::{Coverage, Mask, Stats, coverage, coverage_with_stats};
 pub use critical::{Critical, ScorePage, Scores, critical};
-pub use draw::{EMPTY, Items, draw};
+pub use draw::{Items, draw};
+pub use front::EMPTY;
 pub use image::Picture;
 pub use layers::{Layers, layers};
+pub use level::Wrap;
 pub use msaa::{Multisampled, coverage_multisampled};
 pub use relief::Relief;
-pub use shade::{Light, linear_from_srgb, srgb_from_linear};
-pub use texture::{Texture, Wrap};
+pub use shade::Light;
+pub use srgb::{linear_from_srgb, srgb_from_linear};
+pub use texture::Texture;
 
 use glam::{Vec2, Vec3};
 

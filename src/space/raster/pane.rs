@@ -5,8 +5,8 @@
 //! the same triangles meet the same samples in the same order, a pane at a time.
 
 use super::Scene;
-use super::camera::Corner;
-use super::triangle::{CENTER, reach};
+use super::camera::{Corner, SUBSAMPLES};
+use super::triangle::CENTER;
 
 /// Edge of a pane in samples: depths and items of one take 288 kilobytes.
 const EDGE: i32 = 192;
@@ -42,6 +42,47 @@ impl Pane {
     pub fn place(&self, [x, y]: [usize; 2]) -> [i32; 2] {
         [self.x[0] + x as i32, self.y[0] + y as i32]
     }
+}
+
+/// The first and last column, and row, of a pane that may have samples inside; `None` where none
+/// has.
+pub(super) fn reach<const N: usize>(
+    corners: &[Corner; 3],
+    pane: &Pane,
+    places: [[i32; 2]; N],
+) -> Option<[[i32; 2]; 2]> {
+    let [a, b, c] = corners;
+    if a.is_outside() || b.is_outside() || c.is_outside() {
+        return None;
+    }
+    let ends = |axis: usize, values: [i32; 3], [first, end]: [i32; 2]| {
+        let low = values[0].min(values[1]).min(values[2]);
+        let high = values[0].max(values[1]).max(values[2]);
+        // Whole numbers k with low <= 256 k + place <= high, of all places.
+        let most = places.iter().fold(i32::MIN, |m, p| m.max(p[axis]));
+        let least = places.iter().fold(i32::MAX, |m, p| m.min(p[axis]));
+        let from = (low - most + SUBSAMPLES - 1).div_euclid(SUBSAMPLES);
+        let to = (high - least).div_euclid(SUBSAMPLES);
+        [from.max(first), to.min(end - 1)]
+    };
+    let x = ends(0, [a.x, b.x, c.x], pane.x);
+    let y = ends(1, [a.y, b.y, c.y], pane.y);
+    (x[0] <= x[1] && y[0] <= y[1]).then_some([x, y])
+}
+
+/// Whether any sample may be inside, each of several places of a pixel asked for itself.
+pub(super) fn may_hit<const N: usize>(corners: &[Corner; 3], places: [[i32; 2]; N]) -> bool {
+    let [a, b, c] = corners;
+    let (x0, x1) = (a.x.min(b.x).min(c.x), a.x.max(b.x).max(c.x));
+    let (y0, y1) = (a.y.min(b.y).min(c.y), a.y.max(b.y).max(c.y));
+    // Whether there is a whole number k with low <= 256 k + place <= high.
+    let between = |low: i32, high: i32, place: i32| {
+        high.saturating_sub(place).div_euclid(SUBSAMPLES)
+            > low.saturating_sub(place + 1).div_euclid(SUBSAMPLES)
+    };
+    places
+        .iter()
+        .any(|&[x, y]| between(x0, x1, x) && between(y0, y1, y))
 }
 
 /// The panes of a picture, each with the triangles that may hit it.

@@ -3,7 +3,7 @@
 use wide::{f32x4, i32x4};
 
 use super::camera::floor;
-use super::texture::{Address, Level};
+use super::level::{Address, Level};
 use super::triangle::Plane;
 
 /// Where the samples of a tile read a texture. The same as sample by sample, to the bit.
@@ -92,7 +92,8 @@ impl Patch<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::space::raster::texture::{Texture, Wrap};
+    use crate::space::raster::level::Wrap;
+    use crate::space::raster::texture::Texture;
 
     #[test]
     fn a_tile_reads_what_single_samples_read() {

@@ -5,7 +5,7 @@ use glam::{Vec2, Vec3};
 use super::Scene;
 use super::camera::Corner;
 use super::fragment::divisors;
-use super::texture::Wrap;
+use super::level::Wrap;
 use super::triangle::{Plane, Triangle};
 
 /// A material's normal map (glTF: tangent space, x to the right and y to the top of the image).

@@ -2,8 +2,8 @@
 
 use super::camera::Corner;
 use super::fragment::Fragment;
-use super::pane::Pane;
-use super::triangle::{Triangle, may_hit, reach};
+use super::pane::{Pane, may_hit, reach};
+use super::triangle::Triangle;
 use super::{Material, Sampling, Scene};
 
 /// What drawing needs of one triangle.

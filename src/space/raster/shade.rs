@@ -2,8 +2,9 @@
 
 use glam::Vec3;
 
-use super::draw::{EMPTY, Items};
+use super::draw::Items;
 use super::fragment::{Fragment, divisors};
+use super::front::EMPTY;
 use super::image::Picture;
 use super::triangle::{Plane, Triangle};
 use super::{Camera, Sampling, Scene};
@@ -28,24 +29,6 @@ impl Light {
                 0.22 + 0.28 * sky + 0.6 * sun
             }
         }
-    }
-}
-
-/// Linear light (0 to 1) of an sRGB value (0 to 1), IEC 61966-2-1.
-pub fn linear_from_srgb(value: f32) -> f32 {
-    if value <= 0.040_45 {
-        value / 12.92
-    } else {
-        ((value + 0.055) / 1.055).powf(2.4)
-    }
-}
-
-/// sRGB value (0 to 1) of linear light (0 to 1).
-pub fn srgb_from_linear(value: f32) -> f32 {
-    if value <= 0.003_130_8 {
-        value * 12.92
-    } else {
-        1.055 * value.powf(1.0 / 2.4) - 0.055
     }
 }
 

@@ -3,8 +3,7 @@
 use glam::Vec3;
 
 use super::camera::Corner;
-use super::draw::EMPTY;
-use super::front::Front;
+use super::front::{EMPTY, Front};
 use super::pane::Pane;
 use super::relief::{Bumps, Relief};
 use super::shade::{Light, Surface};
