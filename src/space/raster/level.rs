@@ -1,7 +1,9 @@
 //! One mip of a texture, and how its texels are read.
 
+use wide::f32x4;
+
 use super::blocks::Blocks;
-use super::srgb::light;
+use super::srgb::lights;
 
 /// A sampler's wrap mode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -107,26 +109,33 @@ impl Level {
     /// Alpha mixed from a texel and its neighbours, in units of 1 / (255 * 65536).
     #[inline]
     pub fn mixed(&self, texel: [i32; 2], [right, below]: [u32; 2], address: Address) -> f32 {
-        let texels = self.neighbours(texel, address);
-        let [a, b, c, d] = texels.map(|i| self.alpha[i] as u32);
-        let top = a * (256 - right) + b * right;
-        let bottom = c * (256 - right) + d * right;
+        // Not by `map`: it is called for most samples of all trees, and the compiler leaves that a call.
+        let [a, b, c, d] = self.neighbours(texel, address);
+        let alpha = |i: usize| u32::from(self.alpha[i]);
+        let top = alpha(a) * (256 - right) + alpha(b) * right;
+        let bottom = alpha(c) * (256 - right) + alpha(d) * right;
         (top * (256 - below) + bottom * below) as f32
     }
 
     /// Linear RGB; white where there is alpha alone.
+    #[inline]
     pub fn rgb_at(&self, uv: [f32; 2], address: Address) -> [f32; 3] {
         if self.rgb.is_empty() {
             return [1.0; 3];
         }
         let (texel, [right, below]) = self.place(uv, address);
-        let (right, below) = (right as f32 / 256.0, below as f32 / 256.0);
-        let texels = self.neighbours(texel, address).map(|i| self.rgb[i]);
-        std::array::from_fn(|channel| {
-            let [a, b, c, d] = texels.map(|t| light(t[channel]));
-            let (top, bottom) = (a + (b - a) * right, c + (d - c) * right);
-            top + (bottom - top) * below
-        })
+        let [right, below] = [right, below].map(|part| f32x4::splat(part as f32 / 256.0));
+        let lights = lights();
+        let light = |i: usize| {
+            let [r, g, b] = self.rgb[i];
+            let light = |byte: u8| lights[usize::from(byte)];
+            f32x4::new([light(r), light(g), light(b), 0.0])
+        };
+        let [a, b, c, d] = self.neighbours(texel, address);
+        let [a, b, c, d] = [light(a), light(b), light(c), light(d)];
+        let (top, bottom) = (a + (b - a) * right, c + (d - c) * right);
+        let [r, g, b, _] = (top + (bottom - top) * below).to_array();
+        [r, g, b]
     }
 }
 

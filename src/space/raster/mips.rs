@@ -3,7 +3,7 @@
 use std::sync::LazyLock;
 
 use super::level::Level;
-use super::srgb::{light, srgb_from_linear};
+use super::srgb::{lights, srgb_from_linear};
 
 /// sRGB byte of linear light in 4096 steps of its square root (fine where sRGB is steep).
 static ENCODE: LazyLock<Vec<u8>> = LazyLock::new(|| {
@@ -55,11 +55,14 @@ pub(super) fn halve_alpha(finer: &Level, width: u32, height: u32, out: &mut [u8]
 
 /// Averages light: decoded from sRGB, not weighted by alpha, encoded again.
 fn halve_rgb(finer: &Level, width: u32, height: u32) -> Vec<[u8; 3]> {
-    let encode = &*ENCODE;
+    let (encode, lights) = (&*ENCODE, lights());
     let mut out = Vec::with_capacity(width as usize * height as usize);
     for_each_box(finer, width, height, |indices| {
         out.push(std::array::from_fn(|channel| {
-            let sum: f32 = indices.iter().map(|&i| light(finer.rgb[i][channel])).sum();
+            let sum: f32 = indices
+                .iter()
+                .map(|&i| lights[finer.rgb[i][channel] as usize])
+                .sum();
             let mean = sum / indices.len() as f32;
             encode[(mean.sqrt() * 4095.0 + 0.5) as usize]
         }));

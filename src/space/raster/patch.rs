@@ -48,8 +48,9 @@ impl Patch<'_> {
             while row != 0 {
                 let x = row.trailing_zeros();
                 row &= row - 1;
-                let at = [us[x as usize], vs[x as usize]];
-                found(8 * y + x, at.map(|a| a >> 8), at.map(|a| (a & 255) as u32));
+                let (u, v) = (us[x as usize], vs[x as usize]);
+                let part = [(u & 255) as u32, (v & 255) as u32];
+                found(8 * y + x, [u >> 8, v >> 8], part);
             }
         }
     }

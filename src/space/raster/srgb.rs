@@ -6,9 +6,10 @@ use std::sync::LazyLock;
 static DECODE: LazyLock<[f32; 256]> =
     LazyLock::new(|| std::array::from_fn(|i| linear_from_srgb(i as f32 / 255.0)));
 
-/// Linear light of an sRGB byte.
-pub(super) fn light(byte: u8) -> f32 {
-    DECODE[byte as usize]
+/// Linear light of all sRGB bytes: who looks up several asks once.
+#[inline]
+pub(super) fn lights() -> &'static [f32; 256] {
+    &DECODE
 }
 
 /// Linear light (0 to 1) of an sRGB value (0 to 1), IEC 61966-2-1.
