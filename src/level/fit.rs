@@ -252,6 +252,10 @@ impl Fitted {
 /// Wood with cards, whose images come last.
 pub(super) fn on_page(wood: Scene, mut cards: Surface, images: Vec<Image>, lit: bool) -> Scene {
     let mut scene = wood;
+    if !lit {
+        // They are for normal maps.
+        cards.tangents.clear();
+    }
     cards.material = scene.materials.len() as u32;
     let material = foliage::material(scene.images.len() as u32, lit);
     scene.materials.push(material);
