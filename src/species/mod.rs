@@ -229,14 +229,13 @@ fn of_all(species: &Species) -> Vec<Request> {
 }
 
 /// Makes the levels of all trees, those that start at one size together.
-fn bake_pages(
+fn bake_pages<'t>(
     levels: &mut [Levels],
-    trees: &[Prepared],
+    trees: &'t [Prepared],
     bakers: &[Baker],
     files: &mut Files,
     (request, watch): (&Request, &dyn Watch),
 ) -> Result<Vec<SharedPage>> {
-    let (screen, max_error_px) = (&settings(&request.scene), request.max_error_px);
     let heights = heights(trees);
     begin(watch, "bake levels", heights.len() as u64 + 1)?;
     let originals = levels.iter_mut().filter_map(|l| l.packed.last_mut());
@@ -249,7 +248,7 @@ fn bake_pages(
         let mut made: Vec<(usize, Level)> = Vec::new();
         for (i, (t, baker)) in trees.iter().zip(bakers).enumerate() {
             let Some(rung) = at(t) else { continue };
-            let rung = needed(&t.rungs[rung], max_error_px, baker);
+            let rung = needed(&t.rungs[rung], request.max_error_px, baker);
             let wanted = LevelRequest::of(&rung, baker.recipe.method);
             match baker.fitted(wanted, watch)? {
                 Some(fitted) => candidates.push(Candidate { tree: i, fitted }),
@@ -258,8 +257,10 @@ fn bake_pages(
             }
         }
         let px = pixels(height_px);
-        let models = trees.iter().map(|t| &t.tree.model);
-        let rulers: Vec<Ruler> = models.map(|m| Ruler::new(m, &[px], screen)).collect();
+        let ruler = |(t, levels): (&'t Prepared, &Levels)| {
+            Ruler::new(&t.tree.model, &[px], &settings(&levels.manifest.scene))
+        };
+        let rulers: Vec<Ruler> = trees.iter().zip(levels.iter()).map(ruler).collect();
         let seated = page::seat(candidates, bakers, &rulers, px, watch)?;
         let number = pages.len() + 1;
         if let Some(sheet) = seated.sheet()? {
