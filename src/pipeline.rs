@@ -266,7 +266,7 @@ pub fn lens(scene: &Scene) -> Lens {
 }
 
 /// What the engine that a scene names will not do with the package.
-fn not_done_by(scene: &Scene, instancing: bool) -> Vec<String> {
+pub fn not_done_by(scene: &Scene, instancing: bool) -> Vec<String> {
     let engine = scene.engine;
     let mut out = Vec::new();
     if !engine.makes_mips() && scene.mips == Mips::Engine {

@@ -94,6 +94,17 @@ fn a_row_that_is_only_seen_from_the_road_is_baked_for_that_side() {
     assert!(scene.elevations_deg[1] < 45.0);
     let whole = bake("from_all_sides: true", "whole");
     assert!(whole.sector().is_whole());
+    // With an error that may be, levels take no more triangles than that needs.
+    std::fs::write(home.path("row.csv"), "0,0,-30\n").unwrap();
+    let triangles = |out: &str| {
+        let report = std::fs::read(home.path(out).join("oak/report.json")).unwrap();
+        let report: Value = serde_json::from_slice(&report).unwrap();
+        report["levels"][0]["triangles"].as_u64().unwrap()
+    };
+    bake("", "fine");
+    bake("max_error_px: 30", "coarse");
+    let [fine, coarse] = ["fine", "coarse"].map(triangles);
+    assert!(coarse < fine / 2, "{coarse} {fine}");
 }
 
 #[test]

@@ -82,6 +82,7 @@ impl Baking<'_> {
     fn request(&self, scene: &Scene) -> Request {
         Request {
             wanted: Wanted::Levels(self.spec.levels.into()),
+            max_error_px: Some(self.spec.max_error_px).filter(|&pixels| pixels > 0.0),
             recipe: self.recipe.clone(),
             scene: scene.clone(),
             accept: self.accept,

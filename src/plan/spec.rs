@@ -30,6 +30,9 @@ pub struct Spec {
     /// Triangles that the worst frame may draw; default 0: no limit. Where the levels draw more, all
     /// of them are moved nearer.
     pub triangles_per_frame: u64,
+    /// Levels take no more triangles than this error needs where they start, pixels, up to 1000; default 0: as many as
+    /// they may. What that saves is known once they are baked.
+    pub max_error_px: f64,
     /// Whether levels are fitted for all directions, not only for those from which the path shows them; default false.
     pub from_all_sides: bool,
 }
@@ -71,6 +74,7 @@ impl Default for Spec {
             frames: 120,
             levels: 4,
             triangles_per_frame: 0,
+            max_error_px: 0.0,
             from_all_sides: false,
         }
     }
@@ -84,6 +88,7 @@ impl Knobs for Spec {
             Range::of("region_m", self.region_m, 1.0, 100_000.0),
             Range::of("frames", self.frames, 1.0, 100_000.0),
             Range::of("levels", self.levels, 1.0, 12.0),
+            Range::of("max_error_px", self.max_error_px, 0.0, 1000.0),
         ];
         out.extend(self.scene.ranges());
         let counts = self.species.iter().map(|s| f64::from(s.count));

@@ -17,7 +17,7 @@ use crate::export::package::{Package, remove_beside};
 use crate::knobs::check;
 use crate::level::{Baker, Level, LevelRequest};
 use crate::levels::{Levels, needed};
-use crate::pipeline::{cuts, original_file, pixels, read_back, settings};
+use crate::pipeline::{cuts, not_done_by, original_file, pixels, read_back, settings};
 use crate::prepared::{Pieces, Prepared};
 use crate::recipe::Recipe;
 use crate::report::band::Fault;
@@ -84,6 +84,7 @@ fn made(species: &Species, watch: &dyn Watch) -> Result<BakedSpecies> {
     let name = name(species)?;
     let output = &species.request.output;
     let mut warnings: Vec<String> = check_memory(species)?.into_iter().collect();
+    warnings.extend(not_done_by(&species.request.scene, false));
     let package = Package::start(output, species.request.force)?;
     let requests = of_all(species);
     let prepared = requests.iter().map(|r| Prepared::new(r, watch));
