@@ -4,8 +4,8 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Who loads a package. Each was given single files, the file with `MSFT_lod`, instances by
-/// EXT_mesh_gpu_instancing and 3D Tiles.
+/// Who loads a package. Each was given single files, the file with `MSFT_lod` and instances by
+/// EXT_mesh_gpu_instancing; those that read 3D Tiles these, too, and 3d-tiles-renderer these alone.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Client {
     /// Any that reads glTF: single files are what every client shows right.
@@ -52,13 +52,15 @@ impl Client {
         }
     }
 
-    /// Whether it makes mips of the PNGs in a file that it loads; where it does not, crowns flicker from afar.
+    /// Whether it makes mips of the PNGs in a file that it loads; where it does not, crowns flicker from afar. Two were
+    /// seen to make none; of Blender, which is no engine, and of 3d-tiles-renderer, which draws by three.js, that was not
+    /// looked at.
     pub fn makes_mips(self) -> bool {
         !matches!(self, Self::Godot | Self::Bevy)
     }
 
     /// Whether it draws instances of EXT_mesh_gpu_instancing; the others refuse the file, or draw one.
     pub fn draws_instances(self) -> bool {
-        !matches!(self, Self::Godot | Self::Bevy | Self::TilesRenderer)
+        !matches!(self, Self::Godot | Self::Bevy)
     }
 }

@@ -11,7 +11,7 @@ use crate::space::directions::Direction;
 use crate::space::raster::{
     Camera, Geometry, Mask, Material, Mips, Sampling, Scene, Texture, coverage,
 };
-use crate::space::sector::Sector;
+use crate::space::sector::{Eyes, Sector};
 use crate::space::texture::cutoff;
 
 /// One sample each: masks are fine enough.
@@ -23,7 +23,7 @@ const SAMPLING: Sampling = Sampling {
 /// Masks of the original from the training directions.
 pub struct Original {
     /// Where the tree is seen from.
-    pub sector: Sector,
+    pub eyes: Eyes,
     /// The directions.
     pub directions: Vec<Direction>,
     /// One mask a direction, at `samples_per_unit`.
@@ -123,7 +123,7 @@ impl Original {
                 .par_iter()
                 .map(|camera| Bits::of(&coverage(&scene, camera, SAMPLING)))
                 .collect(),
-            sector,
+            eyes: sector.eyes(),
             directions,
             samples_per_unit,
             height,

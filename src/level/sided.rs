@@ -32,7 +32,7 @@ impl Baker<'_> {
         let differing = |plan: &LevelPlan| {
             let seen = |card: &u32| {
                 let normal = plan.cards[*card as usize].card.normal();
-                self.original.sector.sides(normal) == [true; 2]
+                self.original.eyes.sides(normal) == [true; 2]
             };
             let mut found = differing(&self.tree.model, plan);
             found.retain(seen);
@@ -63,12 +63,12 @@ impl Baker<'_> {
 
     /// Turns cards of which only the back is seen: texels are those of the front.
     pub(super) fn face_the_eye(&self, plan: &mut LevelPlan) {
-        let sector = self.original.sector;
-        if sector.is_whole() {
+        let eyes = &self.original.eyes;
+        if eyes.are_everywhere() {
             return;
         }
         for group in &mut plan.cards {
-            if sector.sides(group.card.normal()) == [false, true] {
+            if eyes.sides(group.card.normal()) == [false, true] {
                 group.card = group.card.turned();
             }
         }

@@ -75,25 +75,21 @@ impl Sector {
         (0..count).map(at).collect()
     }
 
-    /// Whether the front and the back of a plane with this normal are seen from anywhere in the sector.
-    pub fn sides(&self, normal: Vec3) -> [bool; 2] {
-        if self.is_whole() {
-            return [true; 2];
-        }
-        let mut seen = [false; 2];
-        for to_eye in self.samples() {
-            let side = to_eye.dot(normal);
-            seen = [seen[0] || side > 0.0, seen[1] || side < 0.0];
-        }
-        seen
+    /// Where its eyes are, for who asks of many planes.
+    pub fn eyes(&self) -> Eyes {
+        Eyes(match self.is_whole() {
+            true => Vec::new(),
+            false => self.samples().collect(),
+        })
     }
 
     /// Share of upright planes, of all azimuths, whose both sides are seen.
     pub fn both_sides(&self) -> f64 {
         const PLANES: u32 = 180;
+        let eyes = self.eyes();
         let both = |i: &u32| {
             let normal = -direction(*i as f32, 0.0).forward;
-            self.sides(normal) == [true; 2]
+            eyes.sides(normal) == [true; 2]
         };
         (0..PLANES).filter(both).count() as f64 / f64::from(PLANES)
     }
@@ -110,6 +106,26 @@ impl Sector {
                 -direction(azimuth_deg, elevation_deg).forward
             })
         })
+    }
+}
+
+/// Unit vectors from the tree to the eye, all over a sector; none where that is all directions.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Eyes(Vec<Vec3>);
+
+impl Eyes {
+    /// Whether they are everywhere.
+    pub fn are_everywhere(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// Whether the front and the back of a plane with this normal are seen by any of them.
+    pub fn sides(&self, normal: Vec3) -> [bool; 2] {
+        let sees = |sign: f32| self.0.iter().any(|eye| sign * eye.dot(normal) > 0.0);
+        match self.are_everywhere() {
+            true => [true; 2],
+            false => [sees(1.0), sees(-1.0)],
+        }
     }
 }
 
@@ -146,12 +162,13 @@ mod tests {
     #[test]
     fn a_plane_shows_both_sides_only_where_its_edge_is_seen() {
         let front = sector([-30.0, 30.0], [0.0, 0.0]);
-        assert_eq!(front.sides(Vec3::Z), [true, false]);
-        assert_eq!(front.sides(-Vec3::Z), [false, true]);
-        assert_eq!(front.sides(Vec3::X), [true, true]);
+        let eyes = front.eyes();
+        assert_eq!(eyes.sides(Vec3::Z), [true, false]);
+        assert_eq!(eyes.sides(-Vec3::Z), [false, true]);
+        assert_eq!(eyes.sides(Vec3::X), [true, true]);
         // Level planes are seen from above alone.
         let above = sector([-30.0, 30.0], [5.0, 40.0]);
-        assert_eq!(above.sides(Vec3::Y), [true, false]);
+        assert_eq!(above.eyes().sides(Vec3::Y), [true, false]);
         // A sixth of a circle sweeps over the edges of a third of all planes.
         assert!((front.both_sides() - 1.0 / 3.0).abs() < 0.02);
         assert_eq!(sector([0.0, 0.0], [0.0, 0.0]).both_sides(), 0.0);
