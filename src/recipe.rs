@@ -90,9 +90,12 @@ pub struct Recipe {
     /// Training views of the fit and of the area match, 4 to 64.
     pub training_views: u32,
     /// F1 that a level may lose where cards share texels on a page of half the size, a quarter and so on,
-    /// 0 to 0.2; default 0: every card has texels of its own. Where it is more than 0, maps of light (normals;
-    /// occlusion, roughness, metalness) have half the texels of colours along a line.
+    /// 0 to 0.2; default 0: every card has texels of its own.
     pub sharing: f64,
+    /// Times that each side of a level's maps of light (normals; occlusion, roughness, metalness) is half
+    /// that of its colours, 0 to 4; from 1 on a map that is the same everywhere is one texel. Default: 2 where
+    /// `sharing` is more than 0, else 0.
+    pub light_map_halvings: Option<u32>,
     /// Whether cards whose sides differ visibly get a texture for each, at twice the triangles; not with `sharing`.
     pub second_sides: bool,
     /// What is wood and what is foliage where shape and material mislead; the first rule that
@@ -154,6 +157,7 @@ impl Knobs for Recipe {
             Range::of("texel_density", self.texel_density, 0.25, 4.0),
             Range::of("gutter_texels", self.gutter_texels, 0.0, 16.0),
             Range::of("sharing", self.sharing, 0.0, 0.2),
+            Range::of("light_map_halvings", self.own_light_halvings(), 0.0, 4.0),
             Range::of("samples", self.samples, 1.0, 8.0),
             Range::of("refine_rounds", self.refine_rounds, 0.0, 100.0),
             Range::of("validity_px", self.validity_px, 0.1, 64.0),
@@ -183,6 +187,16 @@ impl Recipe {
             Preset::Balanced => Self::balanced(),
             Preset::Best => Self::best(),
         }
+    }
+
+    /// [`light_map_halvings`](Self::light_map_halvings) of cards with texels of their own.
+    pub fn own_light_halvings(&self) -> u32 {
+        self.light_map_halvings.unwrap_or(0)
+    }
+
+    /// [`light_map_halvings`](Self::light_map_halvings) of cards that share texels.
+    pub fn shared_light_halvings(&self) -> u32 {
+        self.light_map_halvings.unwrap_or(2)
     }
 
     /// Whether both make the same package.
@@ -234,6 +248,7 @@ impl Recipe {
             refine_rounds: 3,
             training_views: 24,
             sharing: 0.0,
+            light_map_halvings: None,
             second_sides: true,
             organs: Vec::new(),
             triangular_cards: true,

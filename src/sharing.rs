@@ -161,7 +161,7 @@ pub fn kept(sharing: &Sharing, most: f64) -> Option<String> {
         .collect();
     (!kept.is_empty()).then(|| {
         format!(
-            "level {} keeps its page, with coarser maps of light: none of half the size was found on which it loses at most {most} of F1",
+            "level {} keeps its page: none of half the size was found on which it loses at most {most} of F1",
             kept.join(", ")
         )
     })

@@ -1,8 +1,9 @@
-//! Maps of light at half the resolution of colours.
+//! Maps that are coarser than colours.
 //!
 //! A card's outline and colour are what is seen of it; its normals and its occlusion, roughness and
-//! metalness only shade it. With half as many texels along a line the three images of a page take half the
-//! bytes (1 + 1/4 + 1/4 for 3), and silhouettes stay as they are to the last pixel.
+//! metalness only shade it. With a quarter as many texels along a line the three images of a page take
+//! little more than a third of the bytes (1 + 1/16 + 1/16 for 3), and silhouettes stay as they are to the
+//! last pixel.
 
 use std::sync::Arc;
 
@@ -10,6 +11,30 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use crate::botany::model::Image;
+
+/// Halves each side of the maps of light of a page (base colour, normals, others; or base colour alone)
+/// so many times. Where they may be coarser at all, a map that is the same everywhere is one texel.
+pub fn coarsen_light(page: &mut [Image], halvings: u32) {
+    if halvings > 0 {
+        page.iter_mut().skip(1).for_each(shrink_if_same);
+    }
+    if let [_, normals, others] = page {
+        for _ in 0..halvings {
+            (*normals, *others) = (halved_normals(normals), halved(others));
+        }
+    }
+}
+
+/// Makes an image whose texels are all the same one texel.
+fn shrink_if_same(image: &mut Image) {
+    let mut texels = image.rgba.chunks_exact(4);
+    let Some(first) = texels.next() else {
+        return;
+    };
+    if texels.all(|texel| texel == first) {
+        (image.width, image.height, image.rgba) = (1, 1, Arc::new(first.to_vec()));
+    }
+}
 
 /// A map of half the width and height: each texel the mean of four. A side of one texel stays.
 pub fn halved(image: &Image) -> Image {
@@ -97,6 +122,49 @@ mod tests {
         assert_eq!((row.width, row.height), (2, 1));
         assert_eq!(row.rgba[..2], [1, 15]);
         assert_eq!(halved(&image(1, 1, &four[..1])).rgba[..], four[0]);
+    }
+
+    #[test]
+    fn what_is_the_same_everywhere_takes_one_texel() {
+        let shrunk = |texels: &[[u8; 4]], [width, height]: [u32; 2]| {
+            let mut image = image(width, height, texels);
+            shrink_if_same(&mut image);
+            image
+        };
+        let mut texels = [[7, 8, 9, 255]; 8];
+        let same = shrunk(&texels, [4, 2]);
+        assert_eq!((same.width, same.height), (1, 1));
+        assert_eq!((&same.rgba[..], &*same.name), (&[7, 8, 9, 255][..], "map"));
+        texels[7][2] = 10;
+        let other = shrunk(&texels, [4, 2]);
+        assert_eq!((other.width, other.height, other.rgba.len()), (4, 2, 32));
+        assert_eq!(shrunk(&[], [0, 0]).width, 0);
+    }
+
+    #[test]
+    fn light_becomes_coarser_and_colours_stay() {
+        let map = |first, rest| {
+            let mut texels = [rest; 32];
+            texels[0] = first;
+            image(8, 4, &texels)
+        };
+        let page = [
+            map([1, 2, 3, 4], [1, 2, 3, 4]),
+            map([128, 128, 255, 255], [255, 128, 128, 255]),
+            map([5, 6, 7, 255], [5, 6, 7, 255]),
+        ];
+        let sizes = |halvings| {
+            let mut page = page.clone();
+            coarsen_light(&mut page, halvings);
+            assert_eq!(page[2].rgba[..4], [5, 6, 7, 255]);
+            page.map(|i| [i.width, i.height])
+        };
+        assert_eq!(sizes(0), [[8, 4]; 3]);
+        assert_eq!(sizes(1), [[8, 4], [4, 2], [1, 1]]);
+        assert_eq!(sizes(2), [[8, 4], [2, 1], [1, 1]]);
+        let mut unlit = [page[0].clone()];
+        coarsen_light(&mut unlit, 2);
+        assert_eq!(unlit[0].width, 8);
     }
 
     #[test]

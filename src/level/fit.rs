@@ -220,7 +220,7 @@ impl Fitted {
     }
 
     /// Bleeds the texels and joins wood and cards.
-    pub fn level(mut self, original: &Original, lit: bool) -> Level {
+    pub(super) fn level(mut self, original: &Original, lit: bool) -> Level {
         self.foliage
             .add_backs(GAP_PX * original.height / self.request.height_px);
         self.foliage.bleed();
@@ -235,11 +235,6 @@ impl Fitted {
             density: self.density,
             shared: Vec::new(),
         }
-    }
-
-    /// Width and height of its page, texels.
-    pub fn page_size(&self) -> [u32; 2] {
-        self.foliage.size
     }
 
     /// What the fit wants of each texel, 0 transparent and 1 opaque; where the level was fitted for sharing.

@@ -23,7 +23,7 @@ use crate::detail::whole_tree::{crossed_quads, level_cards, whole_tree};
 use crate::detail::wood::{Wood, WoodOption};
 use crate::error::Result;
 use crate::export::chart::Chart;
-use crate::export::coarser::{halved, halved_normals};
+use crate::export::coarser::coarsen_light;
 use crate::export::foliage::first_of_page;
 use crate::export::matching::Matched;
 use crate::export::original::Original;
@@ -124,21 +124,23 @@ impl Level {
         self.charts.get(self.plan.cards.len() + nth)
     }
 
-    /// The same with maps of light of half the resolution: see [`coarser`](crate::export::coarser).
-    pub fn with_coarser_maps(mut self) -> Self {
-        let images = &mut self.scene.images;
-        let first = first_of_page(images).filter(|_| !self.plan.cards.is_empty());
-        if let Some([_, normals, others]) = first.map(|first| &mut images[first..]) {
-            *normals = halved_normals(normals);
-            *others = halved(others);
-        }
+    /// The same with sides of its maps of light halved so many times: see [`coarser`](crate::export::coarser).
+    pub fn with_coarser_light(mut self, halvings: u32) -> Self {
+        let first = self.scene.images.len() - self.page_images().len();
+        coarsen_light(&mut self.scene.images[first..], halvings);
         self
+    }
+
+    /// The images of the page of its cards, base colour with alpha first; none where it has no cards.
+    pub fn page_images(&self) -> &[Image] {
+        let images = &self.scene.images;
+        let first = first_of_page(images).filter(|_| !self.plan.cards.is_empty());
+        first.map_or(&[], |first| &images[first..])
     }
 
     /// The page of its cards: base colour with alpha.
     pub fn page(&self) -> Option<&Image> {
-        let images = &self.scene.images;
-        first_of_page(images).map(|first| &images[first])
+        self.page_images().first()
     }
 }
 

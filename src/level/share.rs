@@ -6,7 +6,7 @@ use super::fit::{Fitted, on_page};
 use super::{Baker, Level};
 use crate::error::Result;
 use crate::export::atlas::MAX_SIDE;
-use crate::export::coarser::{halved, halved_normals};
+use crate::export::coarser::coarsen_light;
 use crate::export::foliage::Foliage;
 use crate::export::level_scene::AreaGoal;
 use crate::export::matching::{CONTRAST_GUESS, Matched, Standing, match_area};
@@ -19,14 +19,29 @@ use crate::watch::{Watch, part};
 const PASSES: f64 = 6.0;
 
 impl Baker<'_> {
-    /// A level with all that shares its texels, and at last what only has coarser maps of light.
+    /// A level with all that shares its texels, and at last what only has the maps of light of these.
     pub(super) fn finished(&self, fitted: Fitted, watch: &dyn Watch) -> Result<Level> {
         let mut shared = self.shared(&fitted, watch)?;
-        let level = fitted.level(self.original, self.is_lit());
+        let level = self.alone(fitted);
         if self.recipe.sharing > 0.0 && !level.charts.is_empty() {
-            shared.push(level.clone().with_coarser_maps());
+            shared.push(self.as_if_shared(level.clone()));
         }
         Ok(Level { shared, ..level })
+    }
+
+    /// The level on a page of its own.
+    pub fn alone(&self, fitted: Fitted) -> Level {
+        let level = fitted.level(self.original, self.is_lit());
+        level.with_coarser_light(self.recipe.own_light_halvings())
+    }
+
+    /// A level on a page of its own with maps of light as those have that share one.
+    pub fn as_if_shared(&self, alone: Level) -> Level {
+        let [own, shared] = [
+            self.recipe.own_light_halvings(),
+            self.recipe.shared_light_halvings(),
+        ];
+        alone.with_coarser_light(shared - own)
     }
 
     /// The level on pages of half the size, a quarter and so on, the smallest first, while it may lose no
@@ -208,14 +223,15 @@ impl Page {
         self.finer
     }
 
-    /// A level for each guest, all with the same images: maps of light are of half the resolution.
+    /// A level for each guest, all with the same images: maps of light are coarser.
     pub fn levels(mut self, guests: &[Guest]) -> Vec<Level> {
         self.foliage.bleed();
         let lit = guests.iter().any(|guest| guest.baker.is_lit());
         let mut images = self.foliage.images(lit);
-        if let [_, normals, others] = &mut images[..] {
-            (*normals, *others) = (halved_normals(normals), halved(others));
-        }
+        let halvings = guests
+            .iter()
+            .map(|g| g.baker.recipe.shared_light_halvings());
+        coarsen_light(&mut images, halvings.min().unwrap_or(0));
         let level = |(guest, charts): (&Guest, Range<usize>)| {
             let fitted = guest.fitted;
             let surface = self.foliage.surface(charts.clone());

@@ -9,7 +9,8 @@ use super::pool::{Pool, Slot};
 use super::visibility::Visibility;
 
 /// Trees of a few species. For several threads, make one forest for each thread from its
-/// [`shares`](super::shares()) of the trees: [`Visibility`] and cuts are then its own.
+/// [`shares`](super::shares()) of the trees, with a clone of the [`Visibility`]: cuts are then its own, and what
+/// clones of an [`Occlusion`](super::Occlusion) compute they share.
 #[derive(Clone, Debug)]
 pub struct Forest<V> {
     species: Vec<Hierarchy>,

@@ -4,6 +4,9 @@
 //! and sums up how much is hidden, once for each cell and frame at most: while the eye stays in its
 //! cell, no probability changes.
 
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+
 use glam::{IVec3, Vec3};
 
 use super::cells::Cells;
@@ -12,7 +15,8 @@ use super::place::Place;
 use super::visibility::{Sight, Visibility};
 use super::walk::{Law, walk};
 
-/// Occlusion probabilities seen from one eye.
+/// Occlusion probabilities seen from one eye. Clones share what any of them computed, on any thread: a walk to
+/// a cell that several ask for is made once, whatever their eyes.
 #[derive(Clone, Debug)]
 pub struct Occlusion<'g> {
     cells: &'g Cells,
@@ -21,9 +25,56 @@ pub struct Occlusion<'g> {
     eye: IVec3,
     /// Number of the eye's cell among those visited, from 1.
     stamp: u32,
-    /// For each cell the stamp that its probability was computed for.
-    known: Vec<(u32, f32)>,
+    known: Arc<Known>,
     computed: u64,
+}
+
+/// What was computed, shared by clones.
+#[derive(Debug)]
+struct Known {
+    /// Where the last eye that moved is, and its number.
+    last: Mutex<(IVec3, u32)>,
+    /// For each cell the number of the eye that its probability was computed for, and the probability's bits. Whoever
+    /// finds another number computes the same value: nobody waits.
+    cells: Vec<AtomicU64>,
+}
+
+impl Known {
+    fn nothing(cells: &Cells) -> Arc<Self> {
+        let all = cells.solidity().iter();
+        Arc::new(Self {
+            last: Mutex::new((IVec3::MIN, 0)),
+            cells: all.map(|_| AtomicU64::new(0)).collect(),
+        })
+    }
+
+    /// The number of an eye's cell: the last one's if that is where it is, else a new one.
+    fn number(&self, eye: IVec3) -> u32 {
+        let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
+        if last.0 != eye || last.1 == 0 {
+            *last = (eye, last.1.wrapping_add(1));
+            if last.1 == 0 {
+                // After four thousand million eyes numbers begin again.
+                self.cells
+                    .iter()
+                    .for_each(|c| c.store(0, Ordering::Relaxed));
+                last.1 = 1;
+            }
+        }
+        last.1
+    }
+
+    #[inline]
+    fn get(&self, cell: usize, stamp: u32) -> Option<f32> {
+        let known = self.cells[cell].load(Ordering::Relaxed);
+        ((known >> 32) as u32 == stamp).then_some(f32::from_bits(known as u32))
+    }
+
+    #[inline]
+    fn set(&self, cell: usize, stamp: u32, value: f32) {
+        let known = u64::from(stamp) << 32 | u64::from(value.to_bits());
+        self.cells[cell].store(known, Ordering::Relaxed);
+    }
 }
 
 /// Eyes farther off than this many cells are moved nearer, along the line to the grid's middle.
@@ -38,7 +89,7 @@ impl<'g> Occlusion<'g> {
             clumping: 1.0,
             eye: IVec3::MIN,
             stamp: 0,
-            known: vec![(0, 0.0); cells.solidity().len()],
+            known: Known::nothing(cells),
             computed: 0,
         }
     }
@@ -49,7 +100,7 @@ impl<'g> Occlusion<'g> {
     pub fn clumped(self, clumping: f32) -> Self {
         Self {
             clumping: clumping.clamp(0.0, 1.0),
-            ..self
+            ..Self::new(self.cells, self.law)
         }
     }
 
@@ -60,11 +111,7 @@ impl<'g> Occlusion<'g> {
             return false;
         }
         self.eye = cell;
-        self.stamp = self.stamp.wrapping_add(1);
-        if self.stamp == 0 {
-            self.known.fill((0, 0.0));
-            self.stamp = 1;
-        }
+        self.stamp = self.known.number(cell);
         true
     }
 
@@ -87,17 +134,16 @@ impl<'g> Occlusion<'g> {
         let Some(index) = self.cells.index(cell) else {
             return 0.0;
         };
-        let (stamp, value) = self.known[index];
-        if stamp == self.stamp {
+        if let Some(value) = self.known.get(index, self.stamp) {
             return value;
         }
         self.computed += 1;
         let value = walk(self.cells, self.eye, cell, self.law, self.clumping);
-        self.known[index] = (self.stamp, value);
+        self.known.set(index, self.stamp, value);
         value
     }
 
-    /// Walks over the grid so far.
+    /// Walks over the grid so far, without those of clones.
     pub fn computed(&self) -> u64 {
         self.computed
     }
@@ -283,6 +329,32 @@ mod tests {
         assert!(occlusion.look_from(Vec3::new(1.5, 0.5, 0.5)));
         assert!(occlusion.probability(Vec3::new(6.5, 0.5, 0.5)) < first);
         assert_eq!(occlusion.computed(), 2);
+    }
+
+    #[test]
+    fn clones_share_walks_and_keep_their_eyes() {
+        let cells = row(&[0.1; 8]);
+        let mut one = Occlusion::new(&cells, Law::Beer);
+        let mut two = one.clone();
+        let [here, there] = [Vec3::splat(0.5), Vec3::new(2.5, 0.5, 0.5)];
+        let far = Vec3::new(6.5, 0.5, 0.5);
+        one.look_from(here);
+        two.look_from(here);
+        let seen = one.probability(far);
+        assert_eq!(two.probability(far), seen);
+        assert_eq!((one.computed(), two.computed()), (1, 0));
+        // One goes on; the other still sees from where it is, and knows it again when asked twice.
+        assert!(one.look_from(there));
+        let nearer = one.probability(far);
+        assert!(nearer < seen);
+        assert_eq!(two.probability(far), seen);
+        assert_eq!(one.probability(far), nearer);
+        assert!(two.look_from(there) && one.look_from(here));
+        assert_eq!((two.probability(far), one.probability(far)), (nearer, seen));
+        // What hides less is not the same knowledge.
+        let mut thin = one.clone().clumped(0.5);
+        thin.look_from(here);
+        assert!(thin.probability(far) < seen);
     }
 
     #[test]

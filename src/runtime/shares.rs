@@ -2,10 +2,12 @@
 
 use super::place::Place;
 
-/// Which trees each of `count` threads takes, by their index in `places`, ascending. Trees of one block of
-/// `block_m` on the ground stay together, because what hides one of them is nearly what hides the others, and
-/// neighbouring blocks go to different threads, because what is near costs most. Two to four times the distance
-/// between trees is a good block.
+/// Which trees each of `count` threads takes, by their index in `places`. Trees of one block of `block_m` on the
+/// ground stay together, because what hides one of them is nearly what hides the others, and neighbouring blocks go to
+/// different threads, because what is near costs most. Twice the distance between trees is a good block.
+///
+/// Every other share goes from the last tree to the first: two threads that share what hides trees (clones of
+/// [`Occlusion`](super::Occlusion)) are then seldom in one place at once, each computing what the other is about to know.
 ///
 /// A tree that stands nowhere (a position that is not finite) is the first thread's; a block that is not larger than
 /// 0 is taken as 1.
@@ -20,6 +22,7 @@ pub fn shares(places: &[Place], count: usize, block_m: f32) -> Vec<Vec<u32>> {
         let share = i64::from(x) + stride * i64::from(z);
         out[share.rem_euclid(count as i64) as usize].push(tree);
     }
+    out.iter_mut().skip(1).step_by(2).for_each(|s| s.reverse());
     out
 }
 
@@ -62,8 +65,12 @@ mod tests {
                     .iter()
                     .position(|s| s.iter().any(|&t| block(t) == [x, z]))
             };
-            for share in &shares {
-                assert!(share.is_sorted());
+            for (i, share) in shares.iter().enumerate() {
+                assert!(if i % 2 == 0 {
+                    share.is_sorted()
+                } else {
+                    share.is_sorted_by(|a, b| a > b)
+                });
                 // Near enough to alike.
                 let even = 900 / count;
                 assert!(share.len() > even / 2 && share.len() < even * 2, "{count}");

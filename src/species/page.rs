@@ -2,7 +2,6 @@
 
 use crate::error::Result;
 use crate::export::chart::{Chart, Shape};
-use crate::export::foliage::names;
 use crate::export::png::encode_png;
 use crate::export::share::{owners, sheet};
 use crate::level::{Baker, Fitted, Guest, Level, Table, half};
@@ -32,8 +31,6 @@ pub struct Seated {
     /// Texels along a line over those of pages of their own.
     density: f64,
     bytes_without: u64,
-    /// Whether light falls on any of them.
-    lit: bool,
 }
 
 /// The levels on the smallest page on which none loses more F1 than the recipe allows where it starts; on
@@ -48,22 +45,18 @@ pub fn seat(
     height_px: u32,
     watch: &dyn Watch,
 ) -> Result<Seated> {
-    let alone = |c: &Candidate| {
-        let baker = &bakers[c.tree];
-        c.fitted.clone().level(baker.original, baker.is_lit())
-    };
-    let figures: Vec<Figure> = candidates
-        .iter()
-        .map(|c| Ok(rulers[c.tree].measure(&alone(c), height_px)?.0))
-        .collect::<Result<_>>()?;
+    let alone = |c: &Candidate| bakers[c.tree].alone(c.fitted.clone());
+    let mut bytes_without = 0;
+    let mut figures: Vec<Figure> = Vec::with_capacity(candidates.len());
+    for c in &candidates {
+        let level = alone(c);
+        bytes_without += page_bytes(&level);
+        figures.push(rulers[c.tree].measure(&level, height_px)?.0);
+    }
     let mut seated = Seated {
         f1: figures.iter().map(|f| [f.mean; 2]).collect(),
-        bytes_without: candidates
-            .iter()
-            .map(|c| page_bytes(c.fitted.page_size(), bakers[c.tree].is_lit()))
-            .sum(),
+        bytes_without,
         density: 1.0,
-        lit: candidates.iter().any(|c| bakers[c.tree].is_lit()),
         ..Seated::default()
     };
     let guests: Vec<Guest> = candidates
@@ -100,8 +93,8 @@ pub fn seat(
         }
     }
     if !seated.shared {
-        let coarser = |c: &Candidate| (c.tree, alone(c).with_coarser_maps());
-        seated.levels = candidates.iter().map(coarser).collect();
+        let single = |c: &Candidate| (c.tree, bakers[c.tree].as_if_shared(alone(c)));
+        seated.levels = candidates.iter().map(single).collect();
     }
     Ok(seated)
 }
@@ -174,12 +167,8 @@ impl Seated {
             copies: copies.len() as u64,
             copies_of_others: copies.iter().filter(|c| c.card.0 != c.of.0).count() as u64,
             bytes_with: match self.shared {
-                true => bytes_with_coarser_maps(size, self.lit),
-                false => self
-                    .levels
-                    .iter()
-                    .map(|(_, l)| bytes_with_coarser_maps(l.atlas, self.lit))
-                    .sum(),
+                true => self.levels.first().map_or(0, |(_, l)| page_bytes(l)),
+                false => self.levels.iter().map(|(_, l)| page_bytes(l)).sum(),
             },
             bytes_without: self.bytes_without,
             trees: self.levels.iter().zip(&self.f1).map(tree).collect(),
@@ -198,15 +187,10 @@ fn image_bytes([mut w, mut h]: [u32; 2]) -> u64 {
     4 * texels
 }
 
-/// Bytes of the images of a page.
-fn page_bytes(size: [u32; 2], lit: bool) -> u64 {
-    names(lit).len() as u64 * image_bytes(size)
-}
-
-/// Bytes of a page whose maps of light are of half the resolution.
-fn bytes_with_coarser_maps(size: [u32; 2], lit: bool) -> u64 {
-    let maps = names(lit).len() as u64 - 1;
-    image_bytes(size) + maps * image_bytes(size.map(|side| (side / 2).max(1)))
+/// Bytes of the images of a level's page.
+fn page_bytes(level: &Level) -> u64 {
+    let images = level.page_images().iter();
+    images.map(|i| image_bytes([i.width, i.height])).sum()
 }
 
 /// Adds up the pages.
@@ -221,16 +205,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_page_is_three_images_with_all_mips() {
-        assert_eq!(page_bytes([1, 1], true), 12);
+    fn an_image_is_held_with_all_mips() {
+        assert_eq!(image_bytes([1, 1]), 4);
         // 4 x 2, 2 x 1, 1 x 1.
-        assert_eq!(page_bytes([4, 2], true), 12 * (8 + 2 + 1));
-        assert_eq!(page_bytes([4, 2], false), 4 * (8 + 2 + 1));
-        assert_eq!(page_bytes([0, 0], true), 0);
-        assert_eq!(
-            bytes_with_coarser_maps([4, 2], true),
-            4 * (8 + 2 + 1) + 2 * 4 * (2 + 1)
-        );
-        assert_eq!(bytes_with_coarser_maps([4, 2], false), 4 * (8 + 2 + 1));
+        assert_eq!(image_bytes([4, 2]), 4 * (8 + 2 + 1));
+        assert_eq!(image_bytes([0, 0]), 0);
     }
 }

@@ -53,6 +53,11 @@ pub fn variants() -> Vec<Variant> {
     for n in [0.001, 0.1] {
         alone(format!("locality {n}"), &|r| r.locality = n);
     }
+    for n in [1, 2] {
+        alone(format!("light_map_halvings {n}"), &|r| {
+            r.light_map_halvings = Some(n);
+        });
+    }
     for n in [0.01, 0.02] {
         alone(format!("sharing {n}"), &|r| r.sharing = n);
     }
