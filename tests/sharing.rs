@@ -1,6 +1,7 @@
 //! `bake --sharing`: fewer texels within the F1 that the user allows.
 
 use std::path::Path;
+use std::sync::LazyLock;
 
 use pleach::botany::grow::{Options, Species, grow};
 use pleach::botany::load::load;
@@ -53,6 +54,13 @@ fn baked_by(folder: &Path, recipe: Recipe, threads: usize) -> Baked {
         .unwrap()
 }
 
+/// What all tests compare with: nothing is shared. Its folder and what is in it.
+static PLAIN: LazyLock<(tempfile::TempDir, Baked)> = LazyLock::new(|| {
+    let home = tempfile::tempdir().unwrap();
+    let plain = baked(home.path(), 0.0, 1);
+    (home, plain)
+});
+
 fn bytes(folder: &Path, baked: &Baked) -> Vec<Vec<u8>> {
     let read = |file: &String| std::fs::read(folder.join("out").join(file)).unwrap();
     baked.files.iter().map(read).collect()
@@ -62,11 +70,11 @@ fn bytes(folder: &Path, baked: &Baked) -> Vec<Vec<u8>> {
 fn levels_with_shared_texels_are_smaller_and_nearly_as_good() {
     const MOST: f64 = 0.02;
     let home = tempfile::tempdir().unwrap();
-    let (plain, shared) = (home.path().join("plain"), home.path().join("shared"));
-    let (without, with) = (baked(&plain, 0.0, 1), baked(&shared, MOST, 1));
+    let shared = home.path().join("shared");
+    let (without, with) = (&PLAIN.1, baked(&shared, MOST, 1));
 
     // Nothing is asked for: the same figures twice.
-    let told = without.report.sharing.unwrap();
+    let told = without.report.sharing.as_ref().unwrap();
     assert_eq!(told.texture_bytes_with, told.texture_bytes_without);
     assert_eq!(told.f1_with, told.f1_without);
     assert!(
@@ -118,15 +126,16 @@ fn levels_with_shared_texels_are_smaller_and_nearly_as_good() {
 #[test]
 fn what_no_level_can_afford_changes_no_file_and_is_said() {
     let home = tempfile::tempdir().unwrap();
-    let (plain, shared) = (home.path().join("plain"), home.path().join("shared"));
-    let (without, with) = (baked(&plain, 0.0, 2), baked(&shared, 1e-9, 2));
+    let (plain, without) = (PLAIN.0.path(), &PLAIN.1);
+    let shared = home.path().join("shared");
+    let with = baked(&shared, 1e-9, 2);
     let said = with.warnings.iter().any(|w| w.contains("keeps its page"));
     assert!(said, "{:?}", with.warnings);
     let kept = |baked: &Baked| -> Vec<String> {
         let levels = baked.files.iter().filter(|f| f.ends_with(".glb"));
         levels.cloned().collect()
     };
-    assert_eq!(kept(&without), kept(&with));
+    assert_eq!(kept(without), kept(&with));
     let levels = &with.report.sharing.as_ref().unwrap().levels;
     let unchanged = || {
         let same = levels.iter();
@@ -137,7 +146,7 @@ fn what_no_level_can_afford_changes_no_file_and_is_said() {
         // The same in all but maps of light, which have a quarter of the texels along a line.
         assert_eq!(level.f1_with, level.f1_without);
         let file = format!("tree_LOD{}.glb", level.level);
-        let [a, b] = [&plain, &shared].map(|f| load(&f.join("out").join(&file)).unwrap());
+        let [a, b] = [plain, &shared].map(|f| load(&f.join("out").join(&file)).unwrap());
         assert_eq!((&a.positions, &a.uvs), (&b.positions, &b.uvs));
         let ([color, lights @ ..], [same, coarser @ ..]) = (maps(&a), maps(&b));
         assert_eq!(color.rgba, same.rgba);
@@ -166,17 +175,18 @@ fn maps(m: &Model) -> [Image; 3] {
 #[test]
 fn maps_of_light_may_be_coarser_where_nothing_is_shared() {
     let home = tempfile::tempdir().unwrap();
-    let (plain, coarser) = (home.path().join("plain"), home.path().join("coarser"));
+    let (plain, without) = (PLAIN.0.path(), &PLAIN.1);
+    let coarser = home.path().join("coarser");
     let recipe = Recipe {
         light_map_halvings: Some(1),
         ..Recipe::draft()
     };
-    let (without, with) = (baked(&plain, 0.0, 2), baked_by(&coarser, recipe, 2));
+    let with = baked_by(&coarser, recipe, 2);
     let bytes = |b: &Baked| b.report.levels.iter().map(|l| l.texture_bytes).sum::<u64>();
-    assert!(bytes(&with) < bytes(&without));
+    assert!(bytes(&with) < bytes(without));
     for level in 1..=2 {
         let file = format!("tree_LOD{level}.glb");
-        let [a, b] = [&plain, &coarser].map(|f| load(&f.join("out").join(&file)).unwrap());
+        let [a, b] = [plain, &coarser].map(|f| load(&f.join("out").join(&file)).unwrap());
         assert_eq!((&a.positions, &a.uvs), (&b.positions, &b.uvs));
         let ([color, lights @ ..], [same, halves @ ..]) = (maps(&a), maps(&b));
         assert_eq!(color.rgba, same.rgba);

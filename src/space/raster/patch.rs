@@ -61,20 +61,22 @@ impl Patch<'_> {
     fn row(&self, y: i32, columns: [f32x4; 2]) -> [[i32; 8]; 2] {
         let values = |plane: &Plane| {
             let (left, dx) = (f32x4::splat(plane.left(y)), f32x4::splat(plane.dx));
-            columns.map(|x| left + dx * x)
+            [left + dx * columns[0], left + dx * columns[1]]
         };
         let divisor = self.divisor.as_ref().map(values);
-        let size = [self.level.width, self.level.height];
-        std::array::from_fn(|axis| {
-            let mut four = values(&self.uv[axis]);
+        // Written out: of closures that make arrays the compiler makes calls.
+        let along = |plane: &Plane, size: u32| {
+            let [mut left, mut right] = values(plane);
             if let Some(divisor) = divisor {
-                four = [four[0] / divisor[0], four[1] / divisor[1]];
+                (left, right) = (left / divisor[0], right / divisor[1]);
             }
-            let scale = f32x4::splat(size[axis] as f32 * 256.0);
-            let places = four.map(|uv| self.rounded(uv * scale - f32x4::splat(128.0)));
-            let [[a, b, c, d], [e, f, g, h]] = places.map(i32x4::to_array);
+            let (scale, half) = (f32x4::splat(size as f32 * 256.0), f32x4::splat(128.0));
+            let [a, b, c, d] = self.rounded(left * scale - half).to_array();
+            let [e, f, g, h] = self.rounded(right * scale - half).to_array();
             [a, b, c, d, e, f, g, h]
-        })
+        };
+        let [u, v] = &self.uv;
+        [along(u, self.level.width), along(v, self.level.height)]
     }
 
     #[inline]

@@ -1,6 +1,7 @@
 //! Normal maps: which way a surface looks within a triangle.
 
 use glam::{Vec2, Vec3};
+use wide::f32x4;
 
 use super::Scene;
 use super::camera::Corner;
@@ -106,21 +107,29 @@ impl Relief<'_> {
     fn texel(&self, uv: Vec2) -> [f32; 3] {
         let place = |coordinate: f32, size: u32, wrap: Wrap| {
             let at = (coordinate * size as f32 - 0.5).clamp(-1e9, 1e9);
-            let low = at.floor();
-            let texels = [0, 1].map(|step| wrap.apply(low as i32 + step, size));
-            (texels, at - low)
+            // `floor` is a call into the C library on plain x86-64.
+            let whole = at as i32;
+            let low = whole - i32::from(whole as f32 > at);
+            let texels = match low >= 0 && low + 1 < size as i32 {
+                true => [low as usize, low as usize + 1],
+                false => [wrap.apply(low, size), wrap.apply(low + 1, size)],
+            };
+            (texels, f32x4::splat(at - low as f32))
         };
-        let (columns, right) = place(uv.x, self.width, self.wrap[0]);
-        let (rows, below) = place(uv.y, self.height, self.wrap[1]);
-        let value = |row: usize, column: usize, channel: usize| {
-            f32::from(self.rgba[(row * self.width as usize + column) * 4 + channel])
+        let ([left, right], across) = place(uv.x, self.width, self.wrap[0]);
+        let ([above, below], down) = place(uv.y, self.height, self.wrap[1]);
+        let value = |row: usize, column: usize| {
+            let at = (row * self.width as usize + column) * 4;
+            let [r, g, b] = [self.rgba[at], self.rgba[at + 1], self.rgba[at + 2]];
+            f32x4::new([f32::from(r), f32::from(g), f32::from(b), 0.0])
         };
-        std::array::from_fn(|channel| {
-            let [top, bottom] = rows.map(|row| {
-                let [a, b] = columns.map(|column| value(row, column, channel));
-                a + (b - a) * right
-            });
-            (top + (bottom - top) * below) / 127.5 - 1.0
-        })
+        let row = |row: usize| {
+            let (a, b) = (value(row, left), value(row, right));
+            a + (b - a) * across
+        };
+        let (top, bottom) = (row(above), row(below));
+        let mixed = (top + (bottom - top) * down) / f32x4::splat(127.5) - f32x4::ONE;
+        let [r, g, b, _] = mixed.to_array();
+        [r, g, b]
     }
 }
