@@ -31,7 +31,7 @@ fn trees(folder: &Path) -> Vec<PathBuf> {
     std::fs::create_dir_all(folder).unwrap();
     let tree = |(i, name): (usize, &&str)| {
         let options = Options {
-            leaves: Some(120 + 40 * i as u32),
+            leaves: Some(60 + 20 * i as u32),
             seed: i as u64 + 1,
             ..Options::default()
         };

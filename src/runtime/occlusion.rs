@@ -15,8 +15,8 @@ use super::place::Place;
 use super::visibility::{Sight, Visibility};
 use super::walk::{Law, walk};
 
-/// Occlusion probabilities seen from one eye. Clones share what any of them computed, on any thread: a walk to
-/// a cell that several ask for is made once, whatever their eyes.
+/// Occlusion probabilities seen from one eye. Clones share what they compute, on any thread: while their eyes are in one
+/// cell, a walk is made once for all; clones with other eyes get their own answers.
 #[derive(Clone, Debug)]
 pub struct Occlusion<'g> {
     cells: &'g Cells,
