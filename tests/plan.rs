@@ -86,6 +86,18 @@ fn a_larger_tree_counts_as_nearer() {
 }
 
 #[test]
+fn maps_of_light_that_the_recipe_wants_coarser_are_expected_smaller() {
+    let home = Home::new("0,0,-60\n0,0,-100\n", STANDING);
+    std::fs::write(home.file("recipe.ron"), "(light_map_halvings: Some(2))").unwrap();
+    let recipe = home.file("recipe.ron");
+    let (full, coarse) = (home.plan(&[]), home.plan(&["--recipe", &recipe]));
+    let bytes = |answer: &Value| answer["texture_bytes"].as_f64().unwrap();
+    // One map in full, two with a sixteenth of the texels.
+    let share = bytes(&coarse) / bytes(&full);
+    assert!((share - 1.125 / 3.0).abs() < 1e-6, "{share}");
+}
+
+#[test]
 fn a_budget_moves_all_levels_nearer_and_no_further_than_it_has_to() {
     let places = "0,0,-30\n4,0,-32\n-5,0,-50\n";
     let answer = Home::new(places, STANDING).plan(&[]);

@@ -57,13 +57,13 @@ pub fn run(args: &Args) -> Result<()> {
     let spec = read(&args.plan, &base)?;
     let folder = args.plan.parent().unwrap_or(Path::new(""));
     catch_ctrl_c()?;
-    let mut answer = plan(&spec, folder)?;
+    let preset = Recipe::preset(args.preset);
+    let recipe = match &args.recipe {
+        Some(file) => read(file, &preset)?,
+        None => preset,
+    };
+    let mut answer = plan(&spec, &recipe, folder)?;
     if let (true, Some(output)) = (args.bake, &args.output) {
-        let preset = Recipe::preset(args.preset);
-        let recipe = match &args.recipe {
-            Some(file) => read(file, &preset)?,
-            None => preset,
-        };
         let baking = Baking {
             spec: &spec,
             recipe,

@@ -30,7 +30,7 @@ pub struct Kind {
     pub triangles: u64,
     /// Bytes of the original's textures on the GPU, RGBA8 with mips.
     pub texture_bytes: u64,
-    /// Bytes of the file, without others that it refers to.
+    /// Bytes of the file and of those that it refers to.
     pub file_bytes: u64,
     /// What it is painted with: each material's colour and image.
     pub paints: BTreeSet<String>,
@@ -103,7 +103,7 @@ impl Kind {
             name: model.name.clone(),
             triangles: model.triangles.len() as u64,
             texture_bytes: texture_bytes(&model),
-            file_bytes: std::fs::metadata(&input).map_or(0, |m| m.len()),
+            file_bytes: model.file_bytes,
             paints: paints(&model),
             is_unlit: model.is_unlit(),
             atlas: species.atlas.clone(),

@@ -21,6 +21,7 @@ use rayon::prelude::*;
 
 use crate::error::{Error, Result};
 use crate::export::foliage::names;
+use crate::recipe::Recipe;
 use crate::runtime::Cells;
 use crate::scene::{Mips, Scene};
 pub use answer::{Answer, Cost, EngineAnswer, LevelAnswer, SpeciesAnswer};
@@ -47,11 +48,11 @@ const MIPS: f64 = 4.0 / 3.0;
 /// Distances that the camera comes to are rounded outwards by this share.
 const ROUNDING: f64 = 0.01;
 
-/// Plans a scene; paths in `spec` are relative to `folder`.
+/// Plans a scene that will be baked with `recipe`; paths in `spec` are relative to `folder`.
 ///
 /// # Errors
 /// [`Error::Usage`] where there are no trees; those of reading trees and places.
-pub fn plan(spec: &Spec, folder: &Path) -> Result<Answer> {
+pub fn plan(spec: &Spec, recipe: &Recipe, folder: &Path) -> Result<Answer> {
     if spec.species.is_empty() {
         return Err(Error::usage(
             "the plan has no species",
@@ -93,7 +94,7 @@ pub fn plan(spec: &Spec, folder: &Path) -> Result<Answer> {
     for (index, kind) in kinds.iter().enumerate() {
         answer
             .species
-            .push(species(spec, kind, index, nearer, &frames)?);
+            .push(species(spec, recipe, kind, index, nearer, &frames)?);
     }
     shared::partners(&kinds, &mut answer.species);
     let disk = kinds.iter().zip(&answer.species);
@@ -164,6 +165,7 @@ fn within_budget(budget: u64, walk: impl Fn(f64) -> Result<Vec<Frame>>) -> Resul
 
 fn species(
     spec: &Spec,
+    recipe: &Recipe,
     kind: &Kind,
     index: usize,
     nearer: f64,
@@ -180,6 +182,9 @@ fn species(
     frames.iter().for_each(|f| from.join(&f.seen[index]));
     let sector = from.sector();
     let maps = names(spec.scene.lit && !kind.is_unlit).len();
+    // Maps of light are coarser where the recipe says so.
+    let light = 0.25f64.powi(recipe.own_light_halvings() as i32);
+    let maps_of_page = 1.0 + (maps - 1) as f64 * light;
     let texel_bytes = spec.scene.texture_format.texel_bytes();
     let levels = ladder.iter().enumerate().map(|(level, range)| {
         let shown = Cost::over(frames.iter().map(|f| f.shown[index][level]));
@@ -193,7 +198,7 @@ fn species(
             shown,
             texture_bytes: match level {
                 0 => (kind.texture_bytes as f64 / 4.0 * texel_bytes) as u64,
-                _ => (texels * maps as f64 * MIPS * texel_bytes) as u64,
+                _ => (texels * maps_of_page * MIPS * texel_bytes) as u64,
             },
         }
     });
