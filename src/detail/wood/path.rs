@@ -219,8 +219,12 @@ fn least_turning(points: &[DVec3]) -> Vec<DVec3> {
     across
 }
 
+/// Radii of the carrier up to which a tube reaches for its axis: what starts farther off touches it nowhere.
+const FARTHEST_AXIS: f64 = 3.0;
+
 /// The point inside the carrying branch where a tube starts: backwards along its own direction
-/// if that meets the carrier (then nothing bends), else the attachment point.
+/// if that meets the carrier (then nothing bends), else the nearest point of its axis, and where that
+/// is far off, as where branches stand free and a skeleton joins them all the same, its own first point.
 fn embedded_base(tree: &Tree, chain: u32, slots: &[u32], first: DVec3, tangent: DVec3) -> DVec3 {
     let nodes = &tree.skeleton.nodes;
     let base = &nodes[tree.skeleton.chains[chain as usize].nodes[0] as usize];
@@ -238,7 +242,12 @@ fn embedded_base(tree: &Tree, chain: u32, slots: &[u32], first: DVec3, tangent: 
     (0..=12)
         .map(|step| first - tangent * (radius * f64::from(step) / 4.0))
         .find(|&p| inside(p))
-        .unwrap_or_else(|| parent.position.as_dvec3())
+        .unwrap_or_else(|| {
+            let near = carrier.windows(2).map(|s| nearest_on(first, s[0], s[1]));
+            near.min_by(|a, b| a.distance(first).total_cmp(&b.distance(first)))
+                .filter(|p| p.distance(first) <= FARTHEST_AXIS * radius)
+                .unwrap_or(first)
+        })
 }
 
 /// The centre line of the carrier near a node, at least two points.
@@ -256,11 +265,16 @@ fn carrier_axis(tree: &Tree, node: u32, slots: &[u32]) -> Vec<DVec3> {
 }
 
 fn distance_to_segment(p: DVec3, a: DVec3, b: DVec3) -> f64 {
+    p.distance(nearest_on(p, a, b))
+}
+
+/// The point between a and b that is nearest to p.
+fn nearest_on(p: DVec3, a: DVec3, b: DVec3) -> DVec3 {
     let length = (b - a).length_squared();
     let t = if length > 0.0 {
         ((p - a).dot(b - a) / length).clamp(0.0, 1.0)
     } else {
         0.0
     };
-    p.distance(a.lerp(b, t))
+    a.lerp(b, t)
 }

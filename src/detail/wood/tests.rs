@@ -268,6 +268,25 @@ fn a_side_branch_starts_inside_its_carrier() {
 }
 
 #[test]
+fn a_rod_that_stands_free_of_what_the_skeleton_joins_it_to_stays_where_it_is() {
+    // Across, and one that stands a third of the way along but is joined to the far end.
+    let across: Vec<_> = (0..9).map(|i| (Vec3::X * i as f32 / 8.0, 0.01)).collect();
+    let upright = [
+        (Vec3::new(0.3, 0.0, 0.0), 0.01),
+        (Vec3::new(0.3, 1.0, 0.0), 0.01),
+    ];
+    let mut tree = tree_of(&across, 8);
+    add_tube(&mut tree, &upright, 8, Some((0, 8)));
+    let wood = Wood::new(&tree, true);
+    let mut mesh = WoodMesh::default();
+    wood.build_tube(1, 1, 1.0, &mut mesh);
+    assert!(!mesh.positions.is_empty());
+    for p in &mesh.positions {
+        assert!((p.x - 0.3).abs() < 0.05, "{p}");
+    }
+}
+
+#[test]
 fn degenerate_chains_have_an_answer() {
     // One node without a parent; two coincident nodes; zero radius; no triangles.
     let mut tree = tree_of(&line(4, 0.0, 0.0, 0.0), 6);
