@@ -7,6 +7,7 @@ use pleach::botany::grow::{Options, Species, grow};
 use pleach::botany::load::load;
 use pleach::botany::model::{AlphaMode, Image, Model};
 use pleach::export::manifest::{Manifest, SUFFIX};
+use pleach::ladder::Limit;
 use pleach::pipeline::{Baked, Request, Wanted, bake};
 use pleach::recipe::Recipe;
 use pleach::report::texture_bytes;
@@ -121,6 +122,43 @@ fn levels_with_shared_texels_are_smaller_and_nearly_as_good() {
             );
         }
     }
+}
+
+#[test]
+fn leaves_that_have_cards_of_their_own_show_a_few_tiles() {
+    const MOST: f64 = 0.01;
+    let home = tempfile::tempdir().unwrap();
+    let options = Options {
+        leaves: Some(300),
+        ..Options::default()
+    };
+    let input = home.path().join("tree.glb");
+    let grown = grow(&Species::named("oak").unwrap(), &options).unwrap();
+    std::fs::write(&input, grown.glb).unwrap();
+    let request = Request {
+        input,
+        output: home.path().join("out"),
+        wanted: Wanted::Limits(vec![Limit::Count(1200)]),
+        recipe: Recipe {
+            sharing: MOST,
+            ..Recipe::draft()
+        },
+        scene: Scene {
+            screen_height_px: 256,
+            heights_px: vec![200.0],
+            ..Scene::default()
+        },
+        accept: true,
+        ..Request::default()
+    };
+    let with = bake(&request, &Unwatched).unwrap();
+    let level = &with.report.sharing.as_ref().unwrap().levels[0];
+    assert!(level.copies > 150, "{level:?}");
+    assert!(level.f1_with >= level.f1_without - MOST, "{level:?}");
+    assert!(
+        12 * level.texture_bytes_with <= level.texture_bytes_without,
+        "{level:?}"
+    );
 }
 
 #[test]

@@ -133,7 +133,11 @@ fn levels_of_all_trees_show_one_page_and_are_nearly_as_good_as_alone() {
             );
             let told = &all.report.pages[k].trees[i];
             assert_eq!((told.name.as_str(), told.level), (*name, k as u32 + 1));
-            assert!((told.f1_with - with).abs() < 1e-9);
+            assert!(
+                (told.f1_with - with).abs() < 1e-9,
+                "{name} {k}: {} {with}",
+                told.f1_with
+            );
             assert!((told.f1_without - without).abs() < 1e-9);
         }
         let report = &shared.levels[0].sizes[0];
@@ -155,7 +159,7 @@ fn manifests_say_whose_texels_a_copy_shows() {
     let (home, all) = &*BAKED;
     let folder = home.path().join(SPECIES);
     let manifests: Vec<Manifest> = manifests(&folder).collect();
-    let (mut copies, mut others, mut on_tiles) = (0, 0, 0);
+    let (mut copies, mut others, mut large, mut on_tiles) = (0, 0, 0, 0);
     for (own, manifest) in manifests.iter().enumerate() {
         assert_eq!(
             (manifest.species.as_str(), &manifest.files),
@@ -177,7 +181,11 @@ fn manifests_say_whose_texels_a_copy_shows() {
                 assert_eq!(tile.copy_of, None);
                 let [a, b] = [card.atlas, tile.atlas];
                 let meet = |i: usize| a[i] < b[i] + b[i + 2] && b[i] < a[i] + a[i + 2];
-                on_tiles += u64::from(meet(0) && meet(1));
+                // Nearly empty cards, most of them of a few texels, may lie where no tile has any.
+                if a[2] * a[3] > 32 {
+                    large += 1;
+                    on_tiles += u64::from(meet(0) && meet(1));
+                }
             }
         }
     }
@@ -189,8 +197,8 @@ fn manifests_say_whose_texels_a_copy_shows() {
         [told(|p| p.copies), told(|p| p.copies_of_others)]
     );
     assert!(others > 0);
-    // Nearly empty cards may lie where no tile has a texel.
-    assert!(on_tiles > copies * 19 / 20, "{on_tiles} of {copies}");
+    assert!(large > copies / 4, "{large} of {copies}");
+    assert!(50 * on_tiles >= 49 * large, "{on_tiles} of {large}");
 }
 
 #[test]

@@ -11,12 +11,17 @@ use crate::export::foliage::Foliage;
 use crate::export::level_scene::AreaGoal;
 use crate::export::matching::{CONTRAST_GUESS, Matched, Standing, match_area};
 use crate::export::refine::{Target, f1, refine};
-use crate::export::share::{self, Cards, Plan};
+use crate::export::share::{self, Cards, Lone, Plan, lone};
 use crate::watch::{Watch, part};
 
 /// So many times the allowed loss may show in the fit's own measure, which sees single texels: it loses more than
 /// pictures where the level starts, and what passes here is measured there.
 const PASSES: f64 = 6.0;
+
+/// Gutters over those of cards with texels of their own. Around small cards gutters are most of a page, and F1 says what
+/// narrower ones do: with all of them the quaking aspen of 90,420 triangles can't afford half a page at its middle levels,
+/// with a quarter they lose .005 and .007.
+const GUTTER: f32 = 0.25;
 
 impl Baker<'_> {
     /// A level with all that shares its texels, and at last what only has the maps of light of these.
@@ -93,6 +98,8 @@ pub struct Table<'a> {
     guests: &'a [Guest<'a>],
     /// What each level's fit wants of its texels.
     opacity: Vec<Vec<f32>>,
+    /// Cards that show one leaf.
+    lone: Vec<Vec<Option<Lone>>>,
     /// Which charts are whose.
     charts: Vec<Range<usize>>,
     /// Views of each tree.
@@ -123,6 +130,10 @@ impl<'a> Table<'a> {
         Self {
             guests,
             opacity: guests.iter().map(|g| g.fitted.opacity()).collect(),
+            lone: guests
+                .iter()
+                .map(|g| lone(g.baker.tree, &g.fitted.plan.cards))
+                .collect(),
             charts,
             targets,
             goals: guests.iter().map(goal).collect(),
@@ -189,21 +200,23 @@ impl<'a> Table<'a> {
     }
 
     fn cards<'s>(&'s self) -> Vec<Cards<'s>> {
-        let of = |(guest, opacity): (&Guest<'a>, &'s Vec<f32>)| {
+        let of = |((guest, opacity), lone): ((&Guest<'a>, &'s Vec<f32>), &'s Vec<_>)| {
             let (baker, fitted) = (guest.baker, guest.fitted);
             Cards {
                 model: &baker.tree.model,
                 groups: &fitted.plan.cards,
                 density: baker.density(fitted.request),
                 samples: baker.recipe.samples,
-                pad: baker.recipe.gutter_texels,
+                pad: baker.recipe.gutter_texels * GUTTER,
+                lone,
                 fitted: share::Fitted {
                     foliage: &fitted.foliage,
                     opacity,
                 },
             }
         };
-        self.guests.iter().zip(&self.opacity).map(of).collect()
+        let guests = self.guests.iter().zip(&self.opacity);
+        guests.zip(&self.lone).map(of).collect()
     }
 }
 

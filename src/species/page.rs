@@ -193,8 +193,16 @@ fn page_bytes(level: &Level) -> u64 {
     images.map(|i| image_bytes([i.width, i.height])).sum()
 }
 
-/// Adds up the pages.
+/// Adds up the pages, and says what was measured of the written files.
 pub fn add_up(report: &mut SpeciesReport) {
+    let written = |t: &SharedTree| {
+        let tree = report.trees.iter().find(|tree| tree.name == t.name)?;
+        let level = tree.report.levels.get(t.level.checked_sub(1)? as usize)?;
+        Some(level.sizes.first()?.f1.mean)
+    };
+    for tree in report.pages.iter_mut().flat_map(|page| &mut page.trees) {
+        tree.f1_with = written(tree).unwrap_or(tree.f1_with);
+    }
     let sum = |of: fn(&SharedPage) -> u64| report.pages.iter().map(of).sum();
     (report.page_bytes_with, report.page_bytes_without) =
         (sum(|p| p.bytes_with), sum(|p| p.bytes_without));

@@ -1,6 +1,7 @@
 //! The cards of the trees that share a page.
 
 use super::fitted::Fitted;
+use super::lone::Lone;
 use crate::botany::model::Model;
 use crate::export::chart::Chart;
 use crate::export::foliage::CardGroup;
@@ -18,6 +19,8 @@ pub struct Cards<'a> {
     pub samples: u32,
     /// Gutter on each side of a chart, texels.
     pub pad: f32,
+    /// Cards that show one leaf.
+    pub lone: &'a [Option<Lone>],
     /// The level with texels of its own.
     pub fitted: Fitted<'a>,
 }

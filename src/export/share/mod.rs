@@ -4,15 +4,21 @@
 //! shows the piece of a tile that looks most like it (opacity and colour after the best of many
 //! moves and turns found, seen from the front or from behind), and what a texel shows is then
 //! fitted for all cards that show it. Small cards lose least: a page has many pieces of their size,
-//! and their gutters were the larger part of them. Cards of several trees of a species share one page
-//! the same way.
+//! and their gutters were the larger part of them. Where cards show one leaf each, congruent leaves need
+//! no search: a few tiles, finer than others, stand for all of them. Cards of several trees of a species
+//! share one page the same way.
 
 mod cards;
 mod fitted;
+mod lone;
 mod look;
 mod owner;
+mod rank;
+mod search;
 mod sheet;
 mod window;
+
+use std::collections::HashMap;
 
 use glam::Vec2;
 use rayon::prelude::*;
@@ -26,8 +32,10 @@ use crate::space::hull;
 pub use cards::Cards;
 use cards::{Of, all_of};
 pub use fitted::Fitted;
+pub use lone::{Lone, lone};
 use look::{Look, Page, upright};
 pub use owner::owners;
+use rank::Ranking;
 pub use sheet::sheet;
 use window::Window;
 
@@ -38,8 +46,10 @@ pub struct Plan {
     pub size: [u32; 2],
     /// Texels along a line over those that levels should have; 1 or less.
     pub finer: f32,
-    /// All cards, the largest first, by their number in the order of [`all_of`].
+    /// All cards as they are ranked, by their number in the order of [`all_of`].
     order: Vec<u32>,
+    /// So many of the first stand for families of lone leaves.
+    standing: usize,
     /// Charts of the first ones, placed.
     kept: Vec<Chart>,
 }
@@ -52,28 +62,28 @@ const DENSITIES: i32 = 9;
 /// of F1 where all are kept, .006 with this, .010 with .6; a palm of 1,991 more than .010, .006, .005.
 const KEPT: f64 = 0.75;
 
+/// Texels along a line, over others', of tiles that stand for a family: its leaves lie on it at any angle.
+const FOR_ALL: f32 = 2.0;
+
 impl Plan {
     /// The finest texels with which most of the cards' area has tiles of its own on a page of this
     /// size; `None` where even the coarsest are too many.
     pub fn new(trees: &[Cards], size: [u32; 2]) -> Option<Self> {
         let all = all_of(trees);
-        let area = |i: u32| {
-            let of = all[i as usize];
-            let density = f64::from(trees[of.tree as usize].density);
-            f64::from(of.group(trees).card.area()) * density * density
-        };
-        let mut order: Vec<u32> = (0..all.len() as u32).collect();
-        order.sort_by(|&a, &b| area(b).total_cmp(&area(a)).then(a.cmp(&b)));
-        let whole: f64 = order.iter().map(|&i| area(i)).sum();
-        let ranked: Vec<Of> = order.iter().map(|&i| all[i as usize]).collect();
+        let ranking = Ranking::new(trees);
+        let area = |count: usize| ranking.areas[..count].iter().sum::<f64>();
+        let ranked: Vec<Of> = ranking.order.iter().map(|&i| all[i as usize]).collect();
         (0..DENSITIES).find_map(|step| {
             let finer = (-0.25 * step as f32).exp2();
-            let kept = keep(trees, &ranked, finer, size);
-            let held: f64 = order[..kept.len()].iter().map(|&i| area(i)).sum();
-            (held >= KEPT * whole).then(|| Self {
+            let kept = keep(trees, &ranked, ranking.standing, finer, size);
+            // Those that known tiles stand for are no loss.
+            let held = area(kept.len().min(ranking.first));
+            let enough = kept.len() >= ranking.standing && held >= KEPT * area(ranking.first);
+            enough.then(|| Self {
                 size,
                 finer,
-                order: order.clone(),
+                standing: ranking.standing,
+                order: ranking.order.clone(),
                 kept,
             })
         })
@@ -91,13 +101,21 @@ impl Plan {
         let (first, rest) = self.order.split_at(self.kept.len());
         let own: Vec<Of> = first.iter().map(|&i| all[i as usize]).collect();
         let page = Page::new(trees, &own, &self.kept, self.size);
+        let mut standing = Standing::new();
+        for (of, tile) in own[..self.standing].iter().zip(&self.kept) {
+            if let Some((family, lone)) = of.lone(trees) {
+                standing.entry(family).or_default().push((lone, tile));
+            }
+        }
         let copies: Option<Vec<Chart>> = rest
             .par_iter()
             .map(|&i| {
                 let of = all[i as usize];
                 let density = trees[of.tree as usize].density * self.finer;
                 let look = Look::new(of.fitted(trees), of.before(trees), density);
-                let window = Window::find(&look, &page, i.into())?;
+                let known = known(of, trees, &standing, &look, density);
+                let window = Window::best(&known, &look, &page, i.into())
+                    .or_else(|| Window::find(&look, &page, i.into()))?;
                 Some(window.chart(of.before(trees), &look, density))
             })
             .collect();
@@ -121,14 +139,34 @@ impl Plan {
     }
 }
 
-/// Charts of as many of the largest cards as have room on the page.
-fn keep(trees: &[Cards], order: &[Of], finer: f32, size: [u32; 2]) -> Vec<Chart> {
-    let chart = |of: &Of| {
+/// Leaves and tiles that stand for a family.
+type Standing<'a> = HashMap<(u32, u32), Vec<(&'a Lone, &'a Chart)>>;
+
+/// The windows through which a card shows tiles that stand for its family.
+fn known(of: Of, trees: &[Cards], standing: &Standing, look: &Look, density: f32) -> Vec<Window> {
+    let found = of.lone(trees).and_then(|(family, lone)| {
+        let tiles = standing.get(&family)?.iter();
+        let window = |&(other, tile): &(&Lone, &Chart)| {
+            Window::onto(look, density, tile, |p| lone.onto(other, p))
+        };
+        Some(tiles.filter_map(window).collect())
+    });
+    found.unwrap_or_default()
+}
+
+/// Charts of as many of the first cards as have room on the page; those that stand for families have finer texels.
+fn keep(trees: &[Cards], order: &[Of], standing: usize, finer: f32, size: [u32; 2]) -> Vec<Chart> {
+    let chart = |(rank, of): (usize, &Of)| {
         let cards = &trees[of.tree as usize];
         let card = &of.group(trees).card;
+        let finer = if rank < standing {
+            finer * FOR_ALL
+        } else {
+            finer
+        };
         upright(Chart::new(card, cards.density * finer, cards.pad))
     };
-    let all: Vec<Chart> = order.par_iter().map(chart).collect();
+    let all: Vec<Chart> = order.par_iter().enumerate().map(chart).collect();
     let fit = |count: usize| {
         let mut charts = all[..count].to_vec();
         place(&mut charts, size).then_some(charts)

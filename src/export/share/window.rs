@@ -1,14 +1,12 @@
 //! Windows: pieces of a page that a card shows instead of texels of its own.
 
-use std::f32::consts::TAU;
-
 use glam::{Vec2, Vec3};
 
-use super::look::{Look, Page};
+use super::look::Look;
 use crate::export::chart::{Chart, Shape};
-use crate::space::random::Rng;
 
-/// Where on a page a card lies, moved, turned and, seen from behind, mirrored; never scaled.
+/// Where on a page a card lies, moved, turned and, seen from behind, mirrored; scaled only where another tile is known to
+/// show the same.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Window {
     /// The card's middle, texels.
@@ -17,114 +15,47 @@ pub struct Window {
     pub turn: Vec2,
     /// Whether the card is turned over first.
     pub mirrored: bool,
+    /// Texels of the page in a texel of the card's own.
+    pub scale: f32,
     /// Mean squared difference from what the card should look like.
     pub difference: f32,
 }
 
-/// Random windows that are looked at for each card.
-const TRIES: usize = 1500;
-
-/// The best of them, which are moved to where they fit better.
-const BEST: usize = 8;
-
-/// Points of a card that a random window is judged by, and a better one.
-const POINTS: [usize; 2] = [96, 400];
-
-/// Times that the reach of a move shrinks, and moves at each of them.
-const SHRINKS: u32 = 6;
-const MOVES: u32 = 12;
+/// Axes of two planes that show the same are longer and nearer to a right angle than this share.
+const STRETCH: f32 = 0.85;
 
 impl Window {
     /// Where a point of the card's plane, in texels from its middle, lies on the page.
-    fn place(&self, mut q: Vec2) -> Vec2 {
+    pub(super) fn place(&self, mut q: Vec2) -> Vec2 {
         if self.mirrored {
             q.y = -q.y;
         }
-        self.middle + self.turn.rotate(q)
+        self.middle + self.turn.rotate(q) * self.scale
     }
 
-    /// Whether the whole card is on the page.
-    fn fits(&self, look: &Look, size: [u32; 2]) -> bool {
-        // Room for rounding.
-        let [w, h] = size.map(|side| side as f32 - 0.01);
-        look.outline.iter().all(|&corner| {
-            let p = self.place(corner);
-            p.x >= 0.01 && p.y >= 0.01 && p.x <= w && p.y <= h
+    /// The window through which a card shows a tile, where `onto` moves points of the card's plane to that of the
+    /// tile's; `None` where these planes differ too much.
+    pub fn onto(
+        look: &Look,
+        density: f32,
+        tile: &Chart,
+        onto: impl Fn(Vec3) -> Vec3,
+    ) -> Option<Self> {
+        let at = |p: Vec3| tile.atlas_point(onto(p));
+        let middle = at(look.center);
+        let [x, y] = look
+            .axes
+            .map(|axis| at(look.center + axis / density) - middle);
+        let square = x.length() * y.length();
+        let like = x.length().min(y.length()) > STRETCH * x.length().max(y.length())
+            && x.perp_dot(y).abs() > STRETCH * square;
+        (like && square > 0.0).then(|| Self {
+            middle,
+            turn: x.normalize(),
+            mirrored: x.perp_dot(y) < 0.0,
+            scale: square.sqrt(),
+            difference: 0.0,
         })
-    }
-
-    /// The window with its difference over about `points` points of the card; `None` where it is
-    /// not less than `most` or not on the page.
-    fn judged(mut self, look: &Look, page: &Page, points: usize, most: f32) -> Option<Self> {
-        if !self.fits(look, page.size) {
-            return None;
-        }
-        let step = look.points.len().div_ceil(points).max(1);
-        let count = look.points.len().div_ceil(step) as f32;
-        let mut sum = 0.0;
-        for (q, wanted) in look.points.iter().step_by(step) {
-            let p = self.place(*q);
-            let x = (p.x as u32).min(page.size[0] - 1);
-            let y = (p.y as u32).min(page.size[1] - 1);
-            sum += wanted.difference(page.texels[(y * page.size[0] + x) as usize]);
-            if sum >= most * count {
-                return None;
-            }
-        }
-        self.difference = sum / count;
-        Some(self)
-    }
-
-    /// The piece of the page that looks most like the card; `None` where none is found that holds it.
-    pub fn find(look: &Look, page: &Page, stream: u64) -> Option<Self> {
-        if page.owned.is_empty() {
-            return None;
-        }
-        let mut rng = Rng::new(0, stream);
-        let mut best: Vec<Self> = Vec::with_capacity(BEST + 1);
-        for _ in 0..TRIES {
-            let at = page.owned[rng.below(page.owned.len())];
-            let middle = Vec2::new((at % page.size[0]) as f32, (at / page.size[0]) as f32);
-            let tried = Self {
-                middle: middle + Vec2::new(rng.unit(), rng.unit()),
-                turn: Vec2::from_angle(TAU * rng.unit()),
-                mirrored: rng.unit() < 0.5,
-                difference: 0.0,
-            };
-            let most = match best.get(BEST - 1) {
-                Some(last) => last.difference,
-                None => f32::MAX,
-            };
-            if let Some(found) = tried.judged(look, page, POINTS[0], most) {
-                let rank = best.partition_point(|b| b.difference <= found.difference);
-                best.insert(rank, found);
-                best.truncate(BEST);
-            }
-        }
-        best.into_iter()
-            .filter_map(|w| w.moved(look, page, &mut rng))
-            .min_by(|a, b| a.difference.total_cmp(&b.difference))
-    }
-
-    /// The best window nearby.
-    fn moved(self, look: &Look, page: &Page, rng: &mut Rng) -> Option<Self> {
-        let mut best = self.judged(look, page, POINTS[1], f32::MAX)?;
-        let (mut reach, mut swing) = (4.0, 0.25);
-        for _ in 0..SHRINKS {
-            for _ in 0..MOVES {
-                let tried = Self {
-                    middle: best.middle + Vec2::new(rng.sway(), rng.sway()) * reach,
-                    turn: Vec2::from_angle(rng.sway() * swing).rotate(best.turn),
-                    ..best
-                };
-                best = tried
-                    .judged(look, page, POINTS[1], best.difference)
-                    .unwrap_or(best);
-            }
-            reach *= 0.7;
-            swing *= 0.7;
-        }
-        Some(best)
     }
 
     /// The chart of a card that shows this window; `before` is its own.
@@ -136,7 +67,7 @@ impl Window {
             corners.reverse();
             (normal, bitangent) = (-normal, -bitangent);
         }
-        let turn = self.turn * density;
+        let turn = self.turn * density * self.scale;
         let to_x = tangent * turn.x - bitangent * turn.y;
         let to_y = tangent * turn.y + bitangent * turn.x;
         let place = |p: Vec3| {
@@ -165,16 +96,17 @@ impl Window {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use glam::Vec3;
 
     use super::super::fitted::Seen;
+    use super::super::look::Page;
     use super::*;
 
     const SIDE: u32 = 64;
 
     /// Blobs some texels wide, of which no two are alike.
-    fn page() -> Page {
+    pub fn page() -> Page {
         let seen = |x: f32, y: f32| {
             let wave = (0.31 * x + 0.002 * x * y).sin() + (0.27 * y - 0.003 * x * x).cos();
             Seen {
@@ -191,7 +123,7 @@ mod tests {
     }
 
     /// A triangle in a plane of its own.
-    fn before() -> Chart {
+    pub fn before() -> Chart {
         let normal = Vec3::new(0.36, 0.48, 0.8);
         let tangent = Vec3::new(0.8, -0.6, 0.0);
         let [a, b] = [tangent, normal.cross(tangent)];
@@ -212,7 +144,7 @@ mod tests {
     }
 
     /// The look of a card that shows `window` of the page.
-    fn cut_out(window: &Window, page: &Page, chart: &Chart, density: f32) -> Look {
+    pub fn cut_out(window: &Window, page: &Page, chart: &Chart, density: f32) -> Look {
         let axes = [chart.tangent, chart.normal.cross(chart.tangent)];
         let center = chart.corners.iter().sum::<Vec3>() / 3.0;
         let flat = |p: Vec3| Vec2::from(axes.map(|a| (p - center).dot(a))) * density;
@@ -232,37 +164,6 @@ mod tests {
     }
 
     #[test]
-    fn a_piece_is_found_where_it_was_cut_out_turned_or_mirrored() {
-        let (page, chart, density) = (page(), before(), 9.0);
-        for mirrored in [false, true] {
-            let hidden = Window {
-                middle: Vec2::new(37.0, 29.0),
-                turn: Vec2::from_angle(2.1),
-                mirrored,
-                difference: 0.0,
-            };
-            let look = cut_out(&hidden, &page, &chart, density);
-            let found = Window::find(&look, &page, 5).unwrap();
-            let usual: Vec<f32> = (0..40)
-                .filter_map(|i| {
-                    let angle = Vec2::from_angle(i as f32);
-                    let other = Window {
-                        middle: Vec2::splat(32.0) + angle * (i % 12) as f32,
-                        turn: angle.perp(),
-                        mirrored: i % 2 == 0,
-                        difference: 0.0,
-                    };
-                    other
-                        .judged(&look, &page, 400, f32::MAX)
-                        .map(|w| w.difference)
-                })
-                .collect();
-            let usual = usual.iter().sum::<f32>() / usual.len() as f32;
-            assert!(found.difference < 0.35 * usual, "{found:?} {usual}");
-        }
-    }
-
-    #[test]
     fn a_window_keeps_the_cards_place_size_and_sides() {
         let (chart, density) = (before(), 9.0);
         for mirrored in [false, true] {
@@ -270,6 +171,7 @@ mod tests {
                 middle: Vec2::new(30.0, 34.0),
                 turn: Vec2::from_angle(0.7),
                 mirrored,
+                scale: 1.0,
                 difference: 0.0,
             };
             let look = cut_out(&window, &page(), &chart, density);
@@ -304,16 +206,53 @@ mod tests {
     }
 
     #[test]
-    fn no_window_is_smaller_than_its_card() {
-        let (page, chart) = (page(), before());
-        let hidden = Window {
-            middle: Vec2::splat(32.0),
-            turn: Vec2::X,
-            mirrored: false,
-            difference: 0.0,
+    fn a_card_shows_a_tile_that_is_known_to_show_the_same_turned_scaled_and_from_behind() {
+        let (tile, density) = (before(), 9.0);
+        let mut tile = Chart {
+            base: Vec2::splat(20.0),
+            ..tile
         };
-        let mut look = cut_out(&hidden, &page, &chart, 9.0);
-        look.outline.iter_mut().for_each(|c| *c *= 9.0);
-        assert_eq!(Window::find(&look, &page, 1), None);
+        (tile.to_x, tile.to_y) = (tile.to_x * 2.0 * density, tile.to_y * 2.0 * density);
+        let turn = glam::Quat::from_rotation_y(0.8) * glam::Quat::from_rotation_x(0.3);
+        for behind in [false, true] {
+            // The same card elsewhere, of half the size.
+            let away = |p: Vec3| Vec3::new(3.0, 1.0, -2.0) + turn * p * 0.5;
+            let back = |p: Vec3| turn.inverse() * (p - Vec3::new(3.0, 1.0, -2.0)) * 2.0;
+            let mut own = before();
+            own.corners = tile.corners.iter().map(|&c| away(c)).collect();
+            (own.normal, own.tangent) = (turn * own.normal, turn * own.tangent);
+            if behind {
+                own.corners.reverse();
+                own.normal = -own.normal;
+            }
+            let mut look = cut_out(
+                &Window {
+                    middle: Vec2::splat(30.0),
+                    turn: Vec2::X,
+                    mirrored: false,
+                    scale: 1.0,
+                    difference: 0.0,
+                },
+                &page(),
+                &own,
+                density,
+            );
+            look.points.clear();
+            let window = Window::onto(&look, density, &tile, back).unwrap();
+            assert_eq!(window.mirrored, behind);
+            // Twice as many texels a unit, and twice as large.
+            assert!((window.scale - 4.0).abs() < 1e-4, "{}", window.scale);
+            let copy = window.chart(&own, &look, density);
+            for &corner in &own.corners {
+                let (shown, wanted) = (copy.atlas_point(corner), tile.atlas_point(back(corner)));
+                assert!((shown - wanted).length() < 1e-3, "{shown} {wanted}");
+            }
+            // A plane that is seen nearly edge on shows nothing of the kind.
+            let askew = |p: Vec3| {
+                let p = back(p);
+                p - tile.tangent * p.dot(tile.tangent) * 0.7
+            };
+            assert_eq!(Window::onto(&look, density, &tile, askew), None);
+        }
     }
 }
