@@ -1,5 +1,5 @@
 //! Cards that show one leaf each: how congruent leaves lie says where the picture of one card is on
-//! another's tile, turned, mirrored and scaled, without a search.
+//! another's tile, turned, seen from behind and scaled, without a search.
 
 use std::collections::HashMap;
 

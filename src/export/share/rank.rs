@@ -62,3 +62,63 @@ impl Ranking {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::fitted::Fitted;
+    use super::super::lone::Lone;
+    use super::*;
+    use glam::{DQuat, DVec3, Vec2, Vec3};
+
+    use crate::botany::model::Model;
+    use crate::cloud::card::Card;
+    use crate::export::foliage::{CardGroup, Foliage};
+    use crate::space::align::Similarity;
+
+    fn group(side: f32) -> CardGroup {
+        let outline = [Vec2::ZERO, Vec2::X * side, Vec2::ONE * side, Vec2::Y * side];
+        CardGroup {
+            card: Card {
+                origin: Vec3::ZERO,
+                u: Vec3::X,
+                v: Vec3::Y,
+                outline: outline.to_vec(),
+            },
+            triangles: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn what_stands_for_others_comes_first_and_what_others_stand_for_last() {
+        // Eight leaves of a family, the largest in the middle, and two cards of their own.
+        let sides = [1.0, 2.0, 3.0, 4.0, 5.0, 4.5, 3.5, 2.5, 10.0, 0.5];
+        let groups: Vec<CardGroup> = sides.into_iter().map(group).collect();
+        let leaf = Lone {
+            family: 0,
+            placement: Similarity {
+                scale: 1.0,
+                rotation: DQuat::IDENTITY,
+                translation: DVec3::ZERO,
+            },
+        };
+        let lone: Vec<Option<Lone>> = (0..10).map(|i| (i < 8).then_some(leaf)).collect();
+        let (model, foliage) = (Model::default(), Foliage::default());
+        let cards = Cards {
+            model: &model,
+            groups: &groups,
+            density: 2.0,
+            samples: 1,
+            pad: 0.0,
+            lone: &lone,
+            fitted: Fitted {
+                foliage: &foliage,
+                opacity: &[],
+            },
+        };
+        let ranking = Ranking::new(&[cards]);
+        // One in four stands for the family.
+        assert_eq!((ranking.standing, ranking.first), (2, 4));
+        assert_eq!(ranking.order, [4, 5, 8, 9, 3, 6, 2, 7, 1, 0]);
+        assert_eq!(ranking.areas[0], 100.0);
+    }
+}
