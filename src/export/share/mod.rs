@@ -59,7 +59,8 @@ const DENSITIES: i32 = 9;
 
 /// Share of all cards' area that has tiles of its own where a density is taken: large copies lose more
 /// than coarser texels do, small ones less. On a quarter of its page an oak of 1,306 cards loses .008
-/// of F1 where all are kept, .006 with this, .010 with .6; a palm of 1,991 more than .010, .006, .005.
+/// of F1 where all are kept, .006 with this, .010 with .6; a palm of 1,991 more than .010, .006, .005 (measured
+/// with gutters as wide as those of pages that share nothing).
 const KEPT: f64 = 0.75;
 
 /// Texels along a line, over others', of tiles that stand for a family: its leaves lie on it at any angle.
