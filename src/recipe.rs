@@ -92,6 +92,10 @@ pub struct Recipe {
     /// F1 that a level may lose where cards share texels on a page of half the size, a quarter and so on,
     /// 0 to 0.2; default 0: every card has texels of its own.
     pub sharing: f64,
+    /// Squared difference (opacity and colour) of a card that shows another's texels from what it should look like, over
+    /// that of an empty card, 0 to 1; cards that are farther off get texels of their own. Default 0.9; 1: any will do
+    /// that is better than none.
+    pub copy_tolerance: f64,
     /// Times that each side of a level's maps of light (normals; occlusion, roughness, metalness) is half
     /// that of its colours, 0 to 4; from 1 on a map that is the same everywhere is one texel. Default: 2 where
     /// `sharing` is more than 0, else 0.
@@ -157,6 +161,7 @@ impl Knobs for Recipe {
             Range::of("texel_density", self.texel_density, 0.25, 4.0),
             Range::of("gutter_texels", self.gutter_texels, 0.0, 16.0),
             Range::of("sharing", self.sharing, 0.0, 0.2),
+            Range::of("copy_tolerance", self.copy_tolerance, 0.0, 1.0),
             Range::of("light_map_halvings", self.own_light_halvings(), 0.0, 4.0),
             Range::of("samples", self.samples, 1.0, 8.0),
             Range::of("refine_rounds", self.refine_rounds, 0.0, 100.0),
@@ -248,6 +253,7 @@ impl Recipe {
             refine_rounds: 3,
             training_views: 24,
             sharing: 0.0,
+            copy_tolerance: 0.9,
             light_map_halvings: None,
             second_sides: true,
             organs: Vec::new(),

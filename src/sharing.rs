@@ -10,7 +10,7 @@ use crate::error::Result;
 use crate::export::chart::Shape;
 use crate::export::gltf::write_glb;
 use crate::export::png::{encode_images, encode_png};
-use crate::export::share::sheet;
+use crate::export::share::{owners, sheet};
 use crate::level::Level;
 use crate::report::schema::{self, Figure, Report, SharedLevel, Sharing};
 use crate::report::{Drawable, Reference, Settings, texture_bytes};
@@ -99,6 +99,8 @@ impl<'a> Ruler<'a> {
         }
         let copies = level.charts.iter().filter(|c| c.shape == Shape::Window);
         told.copies = copies.count() as u64;
+        told.classes = classes(&level);
+        told.farthest_copy = level.farthest_copy.into();
         told.smaller_page = level.atlas != atlas;
         told.tiles -= told.copies;
         told.density = f64::from(level.density / density);
@@ -110,6 +112,17 @@ impl<'a> Ruler<'a> {
             told,
         })
     }
+}
+
+/// How many tiles others show pieces of.
+fn classes(level: &Level) -> u64 {
+    let mut owners: Vec<u32> = owners(&level.charts, level.atlas)
+        .into_iter()
+        .flatten()
+        .collect();
+    owners.sort_unstable();
+    owners.dedup();
+    owners.len() as u64
 }
 
 /// Whether a level that shares texels loses no more than `most` of F1.

@@ -103,6 +103,9 @@ fn suffix(name: &str) -> String {
     }
 }
 
+/// Follows a level's name in that of its contact sheet.
+pub const SHEET: &str = "_sharing.png";
+
 /// Writes the contact sheets of what levels share.
 pub fn sheets(
     package: &Package,
@@ -113,7 +116,7 @@ pub fn sheets(
     let mut out = Vec::with_capacity(shares.len());
     for ((told, sheet), level) in shares.into_iter().zip(packed) {
         if let Some(sheet) = sheet {
-            let file = format!("{}_sharing.png", level.name);
+            let file = format!("{}{SHEET}", level.name);
             package.write(&file, &sheet)?;
             // The manifest stays last: who finds it finds all the others.
             files.insert(files.len() - 1, file);

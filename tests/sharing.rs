@@ -1,5 +1,6 @@
 //! `bake --sharing`: fewer texels within the F1 that the user allows.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::LazyLock;
 
@@ -104,7 +105,12 @@ fn levels_with_shared_texels_are_smaller_and_nearly_as_good() {
         for tile in copies.clone() {
             assert_eq!(level.cards[tile as usize].copy_of, None);
         }
+        let classes: BTreeSet<u32> = copies.clone().collect();
+        assert_eq!(classes.len() as u64, told.classes);
         assert_eq!(copies.count() as u64, told.copies);
+        let allowed = Recipe::draft().copy_tolerance;
+        assert!(told.farthest_copy <= allowed, "{told:?}");
+        assert_eq!(told.farthest_copy > 0.0, told.copies > 0, "{told:?}");
         let sheet = with
             .files
             .contains(&format!("tree_LOD{}_sharing.png", told.level));
@@ -159,6 +165,26 @@ fn leaves_that_have_cards_of_their_own_show_a_few_tiles() {
         12 * level.texture_bytes_with <= level.texture_bytes_without,
         "{level:?}"
     );
+}
+
+#[test]
+fn a_copy_that_is_farther_off_than_the_recipe_allows_has_texels_of_its_own() {
+    let copies = |copy_tolerance: f64| {
+        let home = tempfile::tempdir().unwrap();
+        let recipe = Recipe {
+            sharing: 0.05,
+            copy_tolerance,
+            ..Recipe::draft()
+        };
+        let baked = baked_by(home.path(), recipe, 2);
+        let levels = baked.report.sharing.unwrap().levels;
+        for level in &levels {
+            assert!(level.farthest_copy <= copy_tolerance, "{level:?}");
+        }
+        levels.iter().map(|l| l.copies).sum::<u64>()
+    };
+    let (any, like, same) = (copies(1.0), copies(0.1), copies(0.0));
+    assert!(any > like && like > same, "{any} {like} {same}");
 }
 
 #[test]

@@ -67,10 +67,11 @@ fn shared(sharing: &Sharing) -> String {
         .filter(|l| l.texture_bytes_with < l.texture_bytes_without)
     {
         out += &format!(
-            "level {}: {} of {} cards show pieces of others, texels {:.2} as fine; {:.1} MB of textures for {:.1}, F1 {:.3} for {:.3}\n",
+            "level {}: {} of {} cards show pieces of {} others, texels {:.2} as fine; {:.1} MB of textures for {:.1}, F1 {:.3} for {:.3}\n",
             level.level,
             level.copies,
             level.copies + level.tiles,
+            level.classes,
             level.density,
             level.texture_bytes_with as f64 / 1_048_576.0,
             level.texture_bytes_without as f64 / 1_048_576.0,

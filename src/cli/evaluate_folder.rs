@@ -76,6 +76,7 @@ impl Evaluated<'_> {
             levels: self.models.1,
             views: &self.settings.view_set(),
             lens: self.settings.lens,
+            sheets: &[],
             made: Some(Made {
                 title: "Behind the figures",
                 recognised,

@@ -8,7 +8,8 @@ use crate::error::{Error, Result};
 use crate::export::package::beside;
 use crate::pipeline::{Baked, REPORT_OFFSET_DEG, Request, lens};
 use crate::report::schema::{Bake, Report};
-use crate::report::{Content, Made, Settings, evaluate};
+use crate::report::{Content, Made, Settings, Sheet, evaluate};
+use crate::written::SHEET;
 
 /// Follows the folder's name in that of the page.
 pub const PAGE: &str = ".report.html";
@@ -70,6 +71,7 @@ pub fn write(request: &Request, baked: &Baked, took: &Bake) -> Result<PathBuf> {
         levels: &models,
         views: &settings.view_set(),
         lens: settings.lens,
+        sheets: &sheets(request, &baked.files)?,
         made: Some(Made {
             title: "How they were made",
             recognised: &baked.recognised,
@@ -87,4 +89,23 @@ pub fn write(request: &Request, baked: &Baked, took: &Bake) -> Result<PathBuf> {
         Error::io(&file, "write", e)
     })?;
     Ok(file)
+}
+
+/// The package's pictures of tiles and their copies, nearest level first.
+fn sheets(request: &Request, files: &[String]) -> Result<Vec<Sheet>> {
+    let level = |file: &String| {
+        let name = file.strip_suffix(SHEET)?;
+        name.rsplit_once("_LOD")?.1.parse::<u32>().ok()
+    };
+    let sheet = |file: &String| {
+        let path = request.output.join(file);
+        let read = |level| {
+            let png = std::fs::read(&path).map_err(|e| Error::io(&path, "read", e))?;
+            Ok(Sheet { level, png })
+        };
+        level(file).map(read)
+    };
+    let mut sheets: Vec<Sheet> = files.iter().filter_map(sheet).collect::<Result<_>>()?;
+    sheets.sort_by_key(|sheet| sheet.level);
+    Ok(sheets)
 }

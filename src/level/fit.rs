@@ -233,6 +233,7 @@ impl Fitted {
             charts: self.foliage.charts,
             atlas: self.foliage.size,
             density: self.density,
+            farthest_copy: 0.0,
             shared: Vec::new(),
         }
     }

@@ -112,6 +112,9 @@ pub struct Level {
     pub atlas: [u32; 2],
     /// Texels a normalised unit that were asked for.
     pub density: f32,
+    /// Largest squared difference of a card that shows another's texels from what it should look like, over that of an
+    /// empty card; 0 where none does.
+    pub farthest_copy: f32,
     /// The same level with cards that share texels, the fewest texels first; empty where the recipe asks
     /// for none or none is good enough.
     pub shared: Vec<Level>,
@@ -219,6 +222,7 @@ impl Baker<'_> {
             charts: Vec::new(),
             atlas: [0; 2],
             density: 0.0,
+            farthest_copy: 0.0,
             shared: Vec::new(),
         }
     }

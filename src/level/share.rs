@@ -7,11 +7,10 @@ use super::{Baker, Level};
 use crate::error::Result;
 use crate::export::atlas::MAX_SIDE;
 use crate::export::coarser::coarsen_light;
-use crate::export::foliage::Foliage;
 use crate::export::level_scene::AreaGoal;
 use crate::export::matching::{CONTRAST_GUESS, Matched, Standing, match_area};
 use crate::export::refine::{Target, f1, refine};
-use crate::export::share::{self, Cards, Lone, Plan, lone};
+use crate::export::share::{self, Cards, Kin, Lone, Plan, Shared, kin, lone, share};
 use crate::watch::{Watch, part};
 
 /// So many times the allowed loss may show in the fit's own measure, which sees single texels: it loses more than
@@ -100,6 +99,8 @@ pub struct Table<'a> {
     opacity: Vec<Vec<f32>>,
     /// Cards that show one leaf.
     lone: Vec<Vec<Option<Lone>>>,
+    /// Sub-trees that cards show.
+    kin: Vec<Vec<Option<Kin>>>,
     /// Which charts are whose.
     charts: Vec<Range<usize>>,
     /// Views of each tree.
@@ -134,6 +135,10 @@ impl<'a> Table<'a> {
                 .iter()
                 .map(|g| lone(g.baker.tree, &g.fitted.plan.cards))
                 .collect(),
+            kin: guests
+                .iter()
+                .map(|g| kin(g.baker.tree, &g.fitted.plan.cards))
+                .collect(),
             charts,
             targets,
             goals: guests.iter().map(goal).collect(),
@@ -165,16 +170,15 @@ impl<'a> Table<'a> {
     pub fn seat(&self, size: [u32; 2], watch: &dyn Watch) -> Result<Option<Page>> {
         part(watch, "share")?;
         let cards = self.cards();
-        let Some(plan) = Plan::new(&cards, size) else {
-            return Ok(None);
-        };
-        let Some(mut foliage) = plan.share(&cards) else {
+        let tolerance = |g: &Guest| g.baker.recipe.copy_tolerance;
+        let tolerance = self.guests.iter().map(tolerance).fold(1.0, f64::min);
+        let Some(mut shared) = share(&cards, size, tolerance) else {
             return Ok(None);
         };
         part(watch, "share")?;
         let refining = self.guests[0].baker.refining();
         let targets: Vec<&Target> = self.targets.iter().flatten().collect();
-        let score = refine(&foliage, &targets, refining);
+        let score = refine(&shared.foliage, &targets, refining);
         let both = self.guests.iter().zip(&self.charts).zip(&self.goals);
         let stand = |((guest, charts), goal): ((&'a Guest<'a>, &Range<usize>), _)| Standing {
             charts: charts.clone(),
@@ -186,21 +190,20 @@ impl<'a> Table<'a> {
             [only] => only.fitted.matched.contrast,
             _ => CONTRAST_GUESS,
         };
-        let matched = match_area(&mut foliage, score, &standing, guess);
+        let matched = match_area(&mut shared.foliage, score, &standing, guess);
         let good = |(i, &least): (usize, &f64)| {
-            f1(&foliage, self.charts[i].clone(), &self.targets[i]) >= least
+            f1(&shared.foliage, self.charts[i].clone(), &self.targets[i]) >= least
         };
         let page = self.least.iter().enumerate().all(good).then_some(Page {
-            foliage,
+            shared,
             matched,
-            finer: plan.finer,
             charts: self.charts.clone(),
         });
         Ok(page)
     }
 
-    fn cards<'s>(&'s self) -> Vec<Cards<'s>> {
-        let of = |((guest, opacity), lone): ((&Guest<'a>, &'s Vec<f32>), &'s Vec<_>)| {
+    fn cards(&self) -> Vec<Cards<'_>> {
+        let of = |(i, guest): (usize, &Guest<'a>)| {
             let (baker, fitted) = (guest.baker, guest.fitted);
             Cards {
                 model: &baker.tree.model,
@@ -208,24 +211,22 @@ impl<'a> Table<'a> {
                 density: baker.density(fitted.request),
                 samples: baker.recipe.samples,
                 pad: baker.recipe.gutter_texels * GUTTER,
-                lone,
+                lone: &self.lone[i],
+                kin: &self.kin[i],
                 fitted: share::Fitted {
                     foliage: &fitted.foliage,
-                    opacity,
+                    opacity: &self.opacity[i],
                 },
             }
         };
-        let guests = self.guests.iter().zip(&self.opacity);
-        guests.zip(&self.lone).map(of).collect()
+        self.guests.iter().enumerate().map(of).collect()
     }
 }
 
 /// Levels on one page, not yet complete.
 pub struct Page {
-    foliage: Foliage,
+    shared: Shared,
     matched: Matched,
-    /// Texels along a line over those that levels should have.
-    finer: f32,
     /// Which charts are whose.
     charts: Vec<Range<usize>>,
 }
@@ -233,29 +234,35 @@ pub struct Page {
 impl Page {
     /// Texels along a line over those that levels should have; 1 or less.
     pub fn finer(&self) -> f32 {
-        self.finer
+        self.shared.finer
     }
 
     /// A level for each guest, all with the same images: maps of light are coarser.
     pub fn levels(mut self, guests: &[Guest]) -> Vec<Level> {
-        self.foliage.bleed();
+        self.shared.foliage.bleed();
         let lit = guests.iter().any(|guest| guest.baker.is_lit());
-        let mut images = self.foliage.images(lit);
+        let mut images = self.shared.foliage.images(lit);
         let halvings = guests
             .iter()
             .map(|g| g.baker.recipe.shared_light_halvings());
         coarsen_light(&mut images, halvings.min().unwrap_or(0));
+        let Shared {
+            foliage,
+            finer,
+            farthest,
+        } = &self.shared;
         let level = |(guest, charts): (&Guest, Range<usize>)| {
             let fitted = guest.fitted;
-            let surface = self.foliage.surface(charts.clone());
+            let surface = foliage.surface(charts.clone());
             Level {
                 scene: on_page(fitted.wood.clone(), surface, images.clone(), lit),
                 request: fitted.request,
                 plan: fitted.plan.clone(),
                 matched: self.matched,
-                charts: self.foliage.charts[charts].to_vec(),
-                atlas: self.foliage.size,
-                density: guest.baker.density(fitted.request) * self.finer,
+                charts: foliage.charts[charts].to_vec(),
+                atlas: foliage.size,
+                density: guest.baker.density(fitted.request) * finer,
+                farthest_copy: *farthest,
                 shared: Vec::new(),
             }
         };

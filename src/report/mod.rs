@@ -31,7 +31,7 @@ pub use cuts::Cuts;
 pub use drawable::Drawable;
 pub use evaluate::{Settings, evaluate, evaluate_watched};
 pub use judge::{Judged, heights, judge};
-pub use page::{Content, Made, Recognised};
+pub use page::{Content, Made, Recognised, Sheet};
 pub use reference::Reference;
 pub use silhouette::{Agreement, agreement};
 pub use start::{Start, start};

@@ -257,6 +257,13 @@ pub struct SharedLevel {
     pub tiles: u64,
     /// Cards that show a piece of these.
     pub copies: u64,
+    /// Tiles that others show a piece of: each is a class of cards that look alike.
+    #[serde(default)]
+    pub classes: u64,
+    /// Largest squared difference (opacity and colour) of a copy from what it should look like, over that of an empty
+    /// card; at most the recipe's `copy_tolerance`.
+    #[serde(default)]
+    pub farthest_copy: f64,
     /// Texels along a line over those that the level has without sharing; 1 where nothing is shared.
     pub density: f64,
     /// Whether its page is smaller than without sharing; otherwise only its maps of light are.

@@ -1,6 +1,7 @@
 //! The cards of the trees that share a page.
 
 use super::fitted::Fitted;
+use super::kin::Kin;
 use super::lone::Lone;
 use crate::botany::model::Model;
 use crate::export::chart::Chart;
@@ -21,6 +22,8 @@ pub struct Cards<'a> {
     pub pad: f32,
     /// Cards that show one leaf.
     pub lone: &'a [Option<Lone>],
+    /// Sub-trees that cards show.
+    pub kin: &'a [Option<Kin>],
     /// The level with texels of its own.
     pub fitted: Fitted<'a>,
 }
@@ -40,6 +43,12 @@ impl Of {
     /// Its chart where it has texels of its own.
     pub fn before<'a>(self, trees: &[Cards<'a>]) -> &'a Chart {
         &trees[self.tree as usize].fitted.foliage.charts[self.card as usize]
+    }
+
+    /// The sub-tree that it shows, if most of it is of one.
+    pub fn kin<'a>(self, trees: &[Cards<'a>]) -> Option<&'a Kin> {
+        let kin = trees[self.tree as usize].kin;
+        kin.get(self.card as usize)?.as_ref()
     }
 
     pub fn fitted<'a>(self, trees: &[Cards<'a>]) -> Fitted<'a> {

@@ -52,6 +52,15 @@ impl Look {
             points,
         }
     }
+
+    /// Mean squared difference of an empty card from it; above 0.
+    pub fn of_empty(&self) -> f32 {
+        let all = self
+            .points
+            .iter()
+            .map(|(_, seen)| seen.difference(Seen::default()));
+        (all.sum::<f32>() / self.points.len() as f32).max(1e-6)
+    }
 }
 
 /// A page of kept tiles, on which windows are searched.

@@ -110,6 +110,7 @@ mod tests {
             samples: 1,
             pad: 0.0,
             lone: &lone,
+            kin: &[],
             fitted: Fitted {
                 foliage: &foliage,
                 opacity: &[],

@@ -34,7 +34,7 @@ impl Window {
 
     /// The window with its difference over about `points` points of the card; `None` where it is
     /// not less than `most` or not on the page.
-    fn judged(mut self, look: &Look, page: &Page, points: usize, most: f32) -> Option<Self> {
+    fn judged(&self, look: &Look, page: &Page, points: usize, most: f32) -> Option<Self> {
         if !self.fits(look, page.size) {
             return None;
         }
@@ -50,8 +50,10 @@ impl Window {
                 return None;
             }
         }
-        self.difference = sum / count;
-        Some(self)
+        Some(Self {
+            difference: sum / count,
+            ..*self
+        })
     }
 
     /// The best of windows that are known to show the same as the card; `None` where none is on the page.
@@ -63,32 +65,33 @@ impl Window {
         best.moved(look, page, &mut Rng::new(0, stream))
     }
 
-    /// The piece of the page that looks most like the card; `None` where none is found that holds it.
-    pub fn find(look: &Look, page: &Page, stream: u64) -> Option<Self> {
+    /// The piece of the page that looks most like the card, among those that are likely to and random ones; `None`
+    /// where none is found that holds it.
+    pub fn find(likely: &[Self], look: &Look, page: &Page, stream: u64) -> Option<Self> {
         if page.owned.is_empty() {
             return None;
         }
         let mut rng = Rng::new(0, stream);
         let mut best: Vec<Self> = Vec::with_capacity(BEST + 1);
-        for _ in 0..TRIES {
-            let at = page.owned[rng.below(page.owned.len())];
-            let middle = Vec2::new((at % page.size[0]) as f32, (at / page.size[0]) as f32);
-            let tried = Self {
-                middle: middle + Vec2::new(rng.unit(), rng.unit()),
-                turn: Vec2::from_angle(TAU * rng.unit()),
-                mirrored: rng.unit() < 0.5,
-                scale: 1.0,
-                difference: 0.0,
-            };
-            let most = match best.get(BEST - 1) {
-                Some(last) => last.difference,
-                None => f32::MAX,
-            };
+        let mut look_at = |tried: &Self| {
+            let most = best.get(BEST - 1).map_or(f32::MAX, |last| last.difference);
             if let Some(found) = tried.judged(look, page, POINTS[0], most) {
                 let rank = best.partition_point(|b| b.difference <= found.difference);
                 best.insert(rank, found);
                 best.truncate(BEST);
             }
+        };
+        likely.iter().for_each(&mut look_at);
+        for _ in 0..TRIES {
+            let at = page.owned[rng.below(page.owned.len())];
+            let middle = Vec2::new((at % page.size[0]) as f32, (at / page.size[0]) as f32);
+            look_at(&Self {
+                middle: middle + Vec2::new(rng.unit(), rng.unit()),
+                turn: Vec2::from_angle(TAU * rng.unit()),
+                mirrored: rng.unit() < 0.5,
+                scale: 1.0,
+                difference: 0.0,
+            });
         }
         best.into_iter()
             .filter_map(|w| w.moved(look, page, &mut rng))
@@ -134,7 +137,7 @@ mod tests {
                 difference: 0.0,
             };
             let look = cut_out(&hidden, &page, &chart, density);
-            let found = Window::find(&look, &page, 5).unwrap();
+            let found = Window::find(&[], &look, &page, 5).unwrap();
             let usual: Vec<f32> = (0..40)
                 .filter_map(|i| {
                     let angle = Vec2::from_angle(i as f32);
@@ -167,6 +170,6 @@ mod tests {
         };
         let mut look = cut_out(&hidden, &page, &chart, 9.0);
         look.outline.iter_mut().for_each(|c| *c *= 9.0);
-        assert_eq!(Window::find(&look, &page, 1), None);
+        assert_eq!(Window::find(&[], &look, &page, 1), None);
     }
 }

@@ -5,8 +5,8 @@ use glam::{Vec2, Vec3};
 use super::look::Look;
 use crate::export::chart::{Chart, Shape};
 
-/// Where on a page a card lies, moved, turned and, seen from behind, mirrored; scaled only where another tile is known to
-/// show the same.
+/// Where on a page a card lies, moved, turned and, seen from behind, mirrored; scaled only where a tile is known or likely
+/// to show the same in another size.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Window {
     /// The card's middle, texels.

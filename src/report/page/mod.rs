@@ -7,6 +7,7 @@ mod embed;
 mod making;
 mod picture;
 mod plot;
+mod sharing;
 mod tables;
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
@@ -16,6 +17,7 @@ use self::embed::data_uri;
 pub use self::making::{Made, Recognised};
 use self::picture::{AGREEMENT, Pair, flip_color, page as atlas_page, pair};
 use self::plot::{Plot, Series, mark};
+pub use self::sharing::Sheet;
 use super::schema::{Level, Report};
 use crate::Result;
 use crate::botany::Model;
@@ -36,6 +38,8 @@ pub struct Content<'a> {
     pub views: &'a [View],
     /// Through what.
     pub lens: Lens,
+    /// Tiles and their copies of levels that share texels.
+    pub sheets: &'a [Sheet],
     /// What is behind the figures.
     pub made: Option<Made<'a>>,
 }
@@ -104,6 +108,9 @@ impl Content<'_> {
                                 @if let Some(made) = self.made {
                                     li { a href="#making" { (made.title) } }
                                 }
+                                @if !self.sheets.is_empty() {
+                                    li { a href="#sharing" { "Shared texels" } }
+                                }
                                 @for level in &self.report.levels {
                                     li { a href={ "#level-" (level.level) } { "Level " (level.level) } }
                                 }
@@ -117,6 +124,7 @@ impl Content<'_> {
                         }
                         (self.diagrams())
                         @if let Some(made) = self.made { (making::sections(made, self.report.cuts.as_ref())) }
+                        @if let Some(shared) = &self.report.sharing { (sharing::section(shared, self.sheets)) }
                         @for section in &sections { (section) }
                         p class="quiet" {
                             "Made by pleach " (env!("CARGO_PKG_VERSION"))
