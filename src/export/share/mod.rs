@@ -16,6 +16,7 @@ mod fitted;
 mod kin;
 mod lone;
 mod look;
+mod mean;
 mod owner;
 mod plan;
 mod rank;
@@ -23,27 +24,22 @@ mod search;
 mod sheet;
 mod window;
 
-use glam::Vec2;
-use rayon::prelude::*;
-
-use super::chart::{Chart, Shape};
-use super::foliage::{CardGroup, Foliage};
-use super::project::{Texel, project};
-use crate::space::hull;
+use super::chart::Chart;
+use super::foliage::Foliage;
 
 pub use cards::Cards;
-use cards::all_of;
 use copies::{Copy, copies};
 pub use fitted::Fitted;
 pub use kin::{Kin, kin};
 pub use lone::{Lone, lone};
+use mean::add_copies;
 pub use owner::owners;
 pub use plan::Plan;
 pub use sheet::sheet;
 
 /// Where copies are too far off, those get tiles that are off by more than these shares of what is allowed, turn by turn:
 /// a new tile moves all others, and what was nearly too far off may be so then.
-const SHARES: [f64; 5] = [0.9, 0.7, 0.5, 0.3, 0.0];
+const SHARES: [f64; 6] = [0.9, 0.7, 0.5, 0.3, 0.0, 0.0];
 
 /// Cards on a page that they share.
 pub struct Shared {
@@ -70,8 +66,7 @@ pub fn share(trees: &[Cards], size: [u32; 2], tolerance: f64) -> Option<Shared> 
         }
         plan = plan.with(trees, farther(share * tolerance).collect())?;
     }
-    let copies = copies(&plan, trees)?;
-    Some(drawn_on(&plan, copies, trees))
+    None
 }
 
 /// All cards as projected: tiles, and what copies add to them.
@@ -95,52 +90,4 @@ fn drawn_on(plan: &Plan, copies: Vec<Copy>, trees: &[Cards]) -> Shared {
         finer: plan.finer,
         farthest,
     }
-}
-
-/// Makes every texel the mean of all cards that show it: coverage of all, colours and normals of what
-/// covers it. A texel where only copies have leaves would be black otherwise.
-fn add_copies(foliage: &mut Foliage, trees: &[Cards]) {
-    let all = foliage.charts.iter().zip(all_of(trees));
-    let copies: Vec<_> = all.filter(|(c, _)| c.shape == Shape::Window).collect();
-    let width = foliage.size[0];
-    let mut drawn: Vec<(usize, Texel)> = copies
-        .par_iter()
-        .flat_map_iter(|&(chart, of)| {
-            shown_by(chart, of.group(trees), &trees[of.tree as usize], width)
-        })
-        .collect();
-    // Those of one texel stay in the order of their cards.
-    drawn.par_sort_by_key(|&(at, _)| at);
-    for shown in drawn.chunk_by(|a, b| a.0 == b.0) {
-        let stored = &mut foliage.texels[shown[0].0];
-        let mut mass = stored.coverage();
-        let mut sums = [stored.color(), stored.normal(), stored.orm()].map(|v| v * mass);
-        for (_, texel) in shown {
-            let values = [texel.color, texel.normal, texel.orm];
-            sums = std::array::from_fn(|k| sums[k] + values[k] * texel.coverage);
-            mass += texel.coverage;
-        }
-        if mass > 0.0 {
-            let [color, normal, orm] = sums.map(|sum| sum / mass);
-            stored.set_color(color);
-            stored.set_normal(normal);
-            stored.set_orm(orm);
-        }
-        stored.set_coverage(mass / (shown.len() + 1) as f32);
-    }
-}
-
-/// What a copy's own leaves show on the texels that it shows, by their index on the page.
-fn shown_by(chart: &Chart, group: &CardGroup, cards: &Cards, width: u32) -> Vec<(usize, Texel)> {
-    let triangles = group.triangles.iter().copied();
-    let drawn = project(cards.model, triangles, chart, cards.samples);
-    let outline: Vec<Vec2> = chart.corners.iter().map(|&c| chart.texel(c)).collect();
-    let [w, h] = chart.size;
-    let all = (0..w * h).map(|i| (i, Vec2::new((i % w) as f32 + 0.5, (i / w) as f32 + 0.5)));
-    all.filter(|&(_, texel)| hull::holds(&outline, texel, 0.0))
-        .map(|(i, _)| {
-            let [ax, ay] = chart.in_atlas(i % w, i / w);
-            ((ay * width + ax) as usize, drawn.texels[i as usize])
-        })
-        .collect()
 }
