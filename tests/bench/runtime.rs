@@ -8,6 +8,8 @@
 //! occlusion) and `collect` of what is in the picture.
 
 use std::hint::black_box;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
 use glam::Vec3;
@@ -97,37 +99,102 @@ impl Took {
     }
 }
 
+/// Forests in one part or two, and a second thread that waits for its part as the workers of an engine do: awake.
+struct Cores<'s, 'g> {
+    setups: &'s [Vec<Mutex<Part<'g>>>],
+    /// What the second thread is to draw: which setup, from where.
+    job: Mutex<(usize, View)>,
+    /// Frames that it was given, and that it has done; the last given is [`ENOUGH`].
+    given: AtomicU64,
+    done: AtomicU64,
+}
+
+const ENOUGH: u64 = u64::MAX;
+
+impl Cores<'_, '_> {
+    /// A frame of a setup, its parts side by side.
+    fn frame(&self, setup: usize, view: &View) {
+        let [first, rest @ ..] = &self.setups[setup][..] else {
+            return;
+        };
+        let given = self.given.load(Ordering::Relaxed) + 1;
+        if !rest.is_empty() {
+            *lock(&self.job) = (setup, *view);
+            self.given.store(given, Ordering::Release);
+        }
+        lock(first).frame(view);
+        while !rest.is_empty() && self.done.load(Ordering::Acquire) != given {
+            std::hint::spin_loop();
+        }
+    }
+
+    /// What is drawn.
+    fn drawn(&self, setup: usize) -> usize {
+        self.setups[setup].iter().map(|p| lock(p).drawn.len()).sum()
+    }
+
+    /// What the second thread does until it is enough.
+    fn second(&self) {
+        let mut last = 0;
+        loop {
+            let given = self.given.load(Ordering::Acquire);
+            if given == ENOUGH {
+                return;
+            }
+            if given == last {
+                std::hint::spin_loop();
+                continue;
+            }
+            last = given;
+            let (setup, view) = *lock(&self.job);
+            lock(&self.setups[setup][1]).frame(&view);
+            self.done.store(given, Ordering::Release);
+        }
+    }
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 /// Walks the path several times with one core's parts and with two cores', in turns, so that what the machine does
 /// besides slows both.
-fn time(views: &[View], setups: &mut [Vec<Part>]) -> Vec<Took> {
+fn time(views: &[View], setups: &[Vec<Mutex<Part>>]) -> Vec<Took> {
+    let cores = Cores {
+        setups,
+        job: Mutex::new((0, views[0])),
+        given: AtomicU64::new(0),
+        done: AtomicU64::new(0),
+    };
+    std::thread::scope(|scope| {
+        scope.spawn(|| cores.second());
+        let took = in_turns(views, &cores);
+        cores.given.store(ENOUGH, Ordering::Release);
+        took
+    })
+}
+
+fn in_turns(views: &[View], cores: &Cores) -> Vec<Took> {
     const ROUNDS: usize = 20;
     let nothing = Took {
         frames: vec![f64::MAX; views.len()],
         drawn: 0,
     };
-    let mut out = vec![nothing; setups.len()];
+    let mut out = vec![nothing; cores.setups.len()];
     for _ in 0..ROUNDS {
-        for (parts, took) in setups.iter_mut().zip(&mut out) {
+        for (setup, took) in out.iter_mut().enumerate() {
             // Each round starts from the same cut.
-            frame(parts, &views[views.len() - 1]);
+            cores.frame(setup, &views[views.len() - 1]);
             took.drawn = 0;
             for (view, best) in views.iter().zip(&mut took.frames) {
                 let start = Instant::now();
-                took.drawn += frame(parts, view);
+                cores.frame(setup, view);
                 *best = best.min(start.elapsed().as_secs_f64() * 1e9);
+                took.drawn += cores.drawn(setup);
             }
         }
     }
     out
-}
-
-/// A frame of all parts side by side; what is drawn.
-fn frame(parts: &mut [Part], view: &View) -> usize {
-    match &mut *parts {
-        [a, b] => drop(rayon::join(|| a.frame(view), || b.frame(view))),
-        all => all.iter_mut().for_each(|p| p.frame(view)),
-    }
-    parts.iter().map(|p| p.drawn.len()).sum()
 }
 
 /// Nanoseconds for the least that anything must do: the fastest of many rounds.
@@ -183,13 +250,11 @@ fn main() {
                     Part::new(&hierarchies, &own, occlusion.clone())
                 };
                 let shares = shares(&places, cores, 2.0 * CELL_M);
-                shares.iter().map(part).collect::<Vec<Part>>()
+                shares.iter().map(part).map(Mutex::new).collect::<Vec<_>>()
             });
             // Two forests that have nothing to do with each other: what two cores of this machine can do at all.
             let apart = one.into_iter().chain(other).collect();
-            let mut setups = [alone, both, apart];
-            // From a thread of the pool, as in an engine's jobs: nobody has to be woken from outside.
-            let took = rayon::scope(|_| time(&views, &mut setups));
+            let took = time(&views, &[alone, both, apart]);
             let one = took[0].mean();
             let can = 2.0 * one / took[2].mean();
             for (cores, took) in (1..).zip(&took[..2]) {

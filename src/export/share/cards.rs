@@ -45,6 +45,15 @@ impl Of {
         &trees[self.tree as usize].fitted.foliage.charts[self.card as usize]
     }
 
+    /// Its only leaf, and the tree and family that it belongs to.
+    pub fn lone<'a>(self, trees: &'a [Cards<'a>]) -> Option<((u32, u32), &'a Lone)> {
+        let lone = trees[self.tree as usize]
+            .lone
+            .get(self.card as usize)?
+            .as_ref()?;
+        Some(((self.tree, lone.family), lone))
+    }
+
     /// The sub-tree that it shows, if most of it is of one.
     pub fn kin<'a>(self, trees: &[Cards<'a>]) -> Option<&'a Kin> {
         let kin = trees[self.tree as usize].kin;

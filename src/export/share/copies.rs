@@ -5,10 +5,10 @@ use std::collections::HashMap;
 use rayon::prelude::*;
 
 use super::cards::{Cards, Of, all_of};
-use super::kin::Relatives;
 use super::lone::Lone;
 use super::look::{Look, Page};
 use super::plan::Plan;
+use super::relatives::Relatives;
 use super::window::Window;
 use crate::export::chart::Chart;
 

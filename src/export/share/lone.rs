@@ -5,7 +5,6 @@ use std::collections::HashMap;
 
 use glam::Vec3;
 
-use super::cards::{Cards, Of};
 use crate::botany::prototype::{Alike, prototypes};
 use crate::botany::tree::Tree;
 use crate::export::foliage::CardGroup;
@@ -73,30 +72,18 @@ impl Lone {
     }
 }
 
-impl Of {
-    /// Its only leaf, and the tree and family that it belongs to.
-    pub(super) fn lone<'a>(self, trees: &'a [Cards<'a>]) -> Option<((u32, u32), &'a Lone)> {
-        let lone = trees[self.tree as usize]
-            .lone
-            .get(self.card as usize)?
-            .as_ref()?;
-        Some(((self.tree, lone.family), lone))
-    }
-}
-
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use std::path::Path;
 
     use crate::botany::grow::{Options, Species, grow};
     use crate::botany::load::{Limits, load_slice};
     use crate::botany::recognise::{RecogniseOptions, recognise};
-    use crate::botany::tree::Leaf;
 
-    fn oak() -> Tree {
+    pub fn oak(leaves: u32) -> Tree {
         let options = Options {
-            leaves: Some(60),
+            leaves: Some(leaves),
             ..Options::default()
         };
         let grown = grow(&Species::named("oak").unwrap(), &options).unwrap();
@@ -104,17 +91,20 @@ mod tests {
         recognise(model, &RecogniseOptions::default()).unwrap()
     }
 
-    fn showing(leaves: &[&Leaf]) -> CardGroup {
+    /// A card of these leaves.
+    pub fn showing(tree: &Tree, leaves: impl IntoIterator<Item = u32>) -> CardGroup {
+        let leaves = leaves.into_iter().map(|leaf| &tree.leaves[leaf as usize]);
         CardGroup {
-            triangles: leaves.iter().flat_map(|l| l.triangles.clone()).collect(),
+            triangles: leaves.flat_map(|l| l.triangles.clone()).collect(),
             ..CardGroup::default()
         }
     }
 
     #[test]
     fn corners_of_a_leaf_come_onto_those_of_another_of_its_family() {
-        let tree = oak();
-        let groups: Vec<CardGroup> = tree.leaves.iter().map(|l| showing(&[l])).collect();
+        let tree = oak(60);
+        let all = 0..tree.leaves.len() as u32;
+        let groups: Vec<CardGroup> = all.map(|l| showing(&tree, [l])).collect();
         let found = lone(&tree, &groups);
         let alike: Vec<(usize, Lone)> = (found.iter().enumerate())
             .filter_map(|(i, l)| Some((i, (*l)?)))
@@ -143,11 +133,8 @@ mod tests {
 
     #[test]
     fn cards_of_two_leaves_or_of_wood_and_families_of_few_have_none() {
-        let tree = oak();
-        let pairs = tree
-            .leaves
-            .chunks(2)
-            .map(|two| showing(&two.iter().collect::<Vec<_>>()));
+        let tree = oak(60);
+        let pairs = (0..tree.leaves.len() as u32 / 2).map(|i| showing(&tree, [2 * i, 2 * i + 1]));
         let found = lone(&tree, &pairs.collect::<Vec<_>>());
         assert!(found.iter().filter(|l| l.is_some()).count() <= 1);
         let mut is_leaf = vec![false; tree.model.triangles.len()];
@@ -162,10 +149,8 @@ mod tests {
             })
             .collect();
         assert_eq!(lone(&tree, &wood), vec![None; 20]);
-        let few: Vec<CardGroup> = tree.leaves[..LEAST_MEMBERS - 1]
-            .iter()
-            .map(|l| showing(&[l]))
-            .collect();
+        let few = 0..LEAST_MEMBERS as u32 - 1;
+        let few: Vec<CardGroup> = few.map(|l| showing(&tree, [l])).collect();
         assert_eq!(lone(&tree, &few), vec![None; LEAST_MEMBERS - 1]);
     }
 }

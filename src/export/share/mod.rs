@@ -20,6 +20,7 @@ mod mean;
 mod owner;
 mod plan;
 mod rank;
+mod relatives;
 mod search;
 mod sheet;
 mod window;
