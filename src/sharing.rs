@@ -1,5 +1,6 @@
 //! Sharing of texels, accepted by the measure that the report uses.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use serde_json::Value;
@@ -99,13 +100,14 @@ impl<'a> Ruler<'a> {
         }
         let copies = level.charts.iter().filter(|c| c.shape == Shape::Window);
         told.copies = copies.count() as u64;
-        told.classes = classes(&level);
+        let owners = owners(&level.charts, level.atlas);
+        told.classes = classes(&owners);
         told.farthest_copy = level.farthest_copy.into();
         told.smaller_page = level.atlas != atlas;
         told.tiles -= told.copies;
         told.density = f64::from(level.density / density);
         let page = level.page().filter(|_| told.copies > 0);
-        let sheet = page.map(|page| encode_png(&sheet(&level.charts, page)));
+        let sheet = page.map(|page| encode_png(&sheet(&level.charts, &owners, page)));
         Ok(Chosen {
             sheet: sheet.transpose()?,
             level,
@@ -115,13 +117,8 @@ impl<'a> Ruler<'a> {
 }
 
 /// How many tiles others show pieces of.
-fn classes(level: &Level) -> u64 {
-    let mut owners: Vec<u32> = owners(&level.charts, level.atlas)
-        .into_iter()
-        .flatten()
-        .collect();
-    owners.sort_unstable();
-    owners.dedup();
+fn classes(owners: &[Option<u32>]) -> u64 {
+    let owners: BTreeSet<&u32> = owners.iter().flatten().collect();
     owners.len() as u64
 }
 

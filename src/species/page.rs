@@ -142,8 +142,11 @@ impl Seated {
         let any = self.shared && charts.iter().any(|c| c.shape == Shape::Window);
         let page = self.levels.first().filter(|_| any);
         let page = page.and_then(|(_, level)| level.page());
-        page.map(|page| encode_png(&sheet(&charts, page)))
-            .transpose()
+        page.map(|page| {
+            let owners = owners(&charts, [page.width, page.height]);
+            encode_png(&sheet(&charts, &owners, page))
+        })
+        .transpose()
     }
 
     /// What is told of the page; `numbers` are those of the trees' levels.

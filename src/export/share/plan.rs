@@ -156,3 +156,41 @@ fn turned_back(mut charts: Vec<Chart>) -> Vec<Chart> {
     }
     charts
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::rank::tests::{cards, group};
+    use super::*;
+    use crate::botany::model::Model;
+    use crate::export::foliage::{CardGroup, Foliage};
+
+    #[test]
+    fn a_copy_that_was_too_far_off_gets_a_tile_beside_those_that_are_there() {
+        // The larger ones have nearly all of the area: their tiles fit, not all of the small ones.
+        let sides = [8.0f32; 9].into_iter().chain([1.0; 40]);
+        let groups: Vec<CardGroup> = sides.map(group).collect();
+        let (model, foliage) = (Model::default(), Foliage::default());
+        let trees = [cards(&model, &foliage, &groups, &[])];
+        let plan = Plan::new(&trees, [48, 48]).unwrap();
+        let tiles = plan.kept.len();
+        assert!((9..49).contains(&tiles), "{tiles}");
+        let far = plan.order[48];
+        let with = plan.with(&trees, BTreeSet::from([far])).unwrap();
+        assert_eq!(with.kept.len(), tiles + 1);
+        assert_eq!(with.order[..tiles], plan.order[..tiles]);
+        assert_eq!(with.order[tiles], far);
+        let sorted = |plan: &Plan| plan.order.iter().copied().collect::<BTreeSet<u32>>();
+        assert_eq!(sorted(&with), sorted(&plan));
+        assert!(with.finer <= plan.finer && with.finer >= COARSEST);
+        // Nor is there a page on which all cards have tiles, however coarse, where it is tiny.
+        let all = plan.order[tiles..].iter().copied().collect();
+        assert!(
+            Plan {
+                size: [8, 8],
+                ..plan
+            }
+            .with(&trees, all)
+            .is_none()
+        );
+    }
+}

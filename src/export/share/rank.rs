@@ -64,7 +64,7 @@ impl Ranking {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::super::fitted::Fitted;
     use super::super::lone::Lone;
     use super::*;
@@ -75,7 +75,8 @@ mod tests {
     use crate::export::foliage::{CardGroup, Foliage};
     use crate::space::align::Similarity;
 
-    fn group(side: f32) -> CardGroup {
+    /// A square card.
+    pub fn group(side: f32) -> CardGroup {
         let outline = [Vec2::ZERO, Vec2::X * side, Vec2::ONE * side, Vec2::Y * side];
         CardGroup {
             card: Card {
@@ -85,6 +86,28 @@ mod tests {
                 outline: outline.to_vec(),
             },
             triangles: Vec::new(),
+        }
+    }
+
+    /// Cards of two texels a unit, without gutters.
+    pub fn cards<'a>(
+        model: &'a Model,
+        foliage: &'a Foliage,
+        groups: &'a [CardGroup],
+        lone: &'a [Option<Lone>],
+    ) -> Cards<'a> {
+        Cards {
+            model,
+            groups,
+            density: 2.0,
+            samples: 1,
+            pad: 0.0,
+            lone,
+            kin: &[],
+            fitted: Fitted {
+                foliage,
+                opacity: &[],
+            },
         }
     }
 
@@ -103,20 +126,7 @@ mod tests {
         };
         let lone: Vec<Option<Lone>> = (0..10).map(|i| (i < 8).then_some(leaf)).collect();
         let (model, foliage) = (Model::default(), Foliage::default());
-        let cards = Cards {
-            model: &model,
-            groups: &groups,
-            density: 2.0,
-            samples: 1,
-            pad: 0.0,
-            lone: &lone,
-            kin: &[],
-            fitted: Fitted {
-                foliage: &foliage,
-                opacity: &[],
-            },
-        };
-        let ranking = Ranking::new(&[cards]);
+        let ranking = Ranking::new(&[cards(&model, &foliage, &groups, &lone)]);
         // One in four stands for the family.
         assert_eq!((ranking.standing, ranking.first), (2, 4));
         assert_eq!(ranking.order, [4, 5, 8, 9, 3, 6, 2, 7, 1, 0]);

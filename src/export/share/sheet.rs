@@ -4,7 +4,6 @@ use std::sync::Arc;
 
 use glam::Vec2;
 
-use super::owner::owners;
 use crate::botany::model::Image;
 use crate::export::chart::{Chart, Shape};
 use crate::space::hull;
@@ -23,12 +22,12 @@ const CARD: [u8; 4] = [214, 222, 232, 255];
 const TILE: [u8; 4] = [232, 222, 196, 255];
 
 /// One row for each tile that others show pieces of, most copies first: the tile on sand, then
-/// copies on blue, each in the shape of its card and as large as it fits. `page` is the level's
-/// base colour with alpha.
-pub fn sheet(charts: &[Chart], page: &Image) -> Image {
+/// copies on blue, each in the shape of its card and as large as it fits. `owners` are those of
+/// [`owners`](super::owners), `page` is the level's base colour with alpha.
+pub fn sheet(charts: &[Chart], owners: &[Option<u32>], page: &Image) -> Image {
     let mut copies: Vec<(u32, Vec<u32>)> = Vec::new();
-    for (copy, owner) in (0..).zip(owners(charts, [page.width, page.height])) {
-        let Some(owner) = owner else { continue };
+    for (copy, owner) in (0..).zip(owners) {
+        let Some(owner) = *owner else { continue };
         match copies.iter_mut().find(|(tile, _)| *tile == owner) {
             Some((_, copies)) => copies.push(copy),
             None => copies.push((owner, vec![copy])),
@@ -92,6 +91,7 @@ fn draw(chart: &Chart, page: &Image, mut put: impl FnMut(u32, u32, [u8; 4])) {
 mod tests {
     use glam::Vec3;
 
+    use super::super::owners;
     use super::*;
 
     /// A square card of 8 texels, its left upper corner at `left` and `top` of the page.
@@ -146,7 +146,7 @@ mod tests {
     #[test]
     fn a_row_shows_the_tile_and_then_its_copy() {
         let (charts, page) = shared();
-        let sheet = sheet(&charts, &page);
+        let sheet = sheet(&charts, &owners(&charts, [16, 8]), &page);
         // The other tile has no copies, so there is one row.
         assert_eq!((sheet.width, sheet.height), (2 * CELL, CELL));
         let pixel = |x: u32, y: u32| {

@@ -87,6 +87,8 @@ impl Content<'_> {
             .map(|(row, model)| self.section(row, model))
             .collect::<Result<_>>()?;
         let levels = self.report.levels.len();
+        let shared = self.report.sharing.as_ref();
+        let shared = shared.filter(|shared| sharing::any(shared));
         let page = html! {
             (DOCTYPE)
             html lang="en" {
@@ -108,7 +110,7 @@ impl Content<'_> {
                                 @if let Some(made) = self.made {
                                     li { a href="#making" { (made.title) } }
                                 }
-                                @if !self.sheets.is_empty() {
+                                @if shared.is_some() {
                                     li { a href="#sharing" { "Shared texels" } }
                                 }
                                 @for level in &self.report.levels {
@@ -124,7 +126,7 @@ impl Content<'_> {
                         }
                         (self.diagrams())
                         @if let Some(made) = self.made { (making::sections(made, self.report.cuts.as_ref())) }
-                        @if let Some(shared) = &self.report.sharing { (sharing::section(shared, self.sheets)) }
+                        @if let Some(shared) = shared { (sharing::section(shared, self.sheets)) }
                         @for section in &sections { (section) }
                         p class="quiet" {
                             "Made by pleach " (env!("CARGO_PKG_VERSION"))
