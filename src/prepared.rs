@@ -89,22 +89,23 @@ impl<'t> Pieces<'t> {
     /// # Errors
     /// [`Error::Interrupted`](crate::error::Error::Interrupted).
     pub fn new(tree: &'t Tree, recipe: &Recipe, scene: &Scene, watch: &dyn Watch) -> Result<Self> {
-        begin(watch, "group", 1)?;
+        begin(watch, "group and look", 1)?;
         let elements = elements(tree);
-        let hierarchy = merge(&elements, recipe.locality);
-        let wood = Wood::new(tree, true);
-        begin(watch, "look", 1)?;
+        let (views, sector) = (recipe.training_views, scene.sector());
+        // Groups are merged one after the other, which leaves other threads free.
+        let (hierarchy, (wood, original)) = rayon::join(
+            || merge(&elements, recipe.locality),
+            || {
+                let wood = Wood::new(tree, true);
+                (wood, Original::new(&tree.model, views, sector, MASK_HEIGHT))
+            },
+        );
         Ok(Self {
-            original: Original::new(
-                &tree.model,
-                recipe.training_views,
-                scene.sector(),
-                MASK_HEIGHT,
-            ),
             tree,
             elements,
             hierarchy,
             wood,
+            original,
         })
     }
 

@@ -612,3 +612,22 @@ fn a_bad_bake_is_refused_with_its_figures_beside_the_package() {
     );
     assert!(Path::new(&output).join("report.json").is_file() && !Path::new(&beside).exists());
 }
+
+/// Its file has most of the trunk's nodes at the thin end, so that the trunk's mean node is a twig; it was drawn as a ribbon
+/// that vanished from one side, and the bake refused.
+#[test]
+fn a_quantised_oak_keeps_its_trunk() {
+    let folder = std::env::var("PLEACH_TREES")
+        .unwrap_or_else(|_| concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/trees").to_owned());
+    let path = Path::new(&folder).join("gt_oak_quantized.glb");
+    if !path.exists() {
+        return println!("skipped: {} is not there", path.display());
+    }
+    let home = tempfile::tempdir().unwrap();
+    let out = home.path().join("oak");
+    let [from, to] = [&path, &out].map(|p| p.to_str().unwrap());
+    let done = pleach(&["bake", from, "-o", to, "--preset", "draft"]);
+    let said = String::from_utf8_lossy(&done.stderr);
+    assert_eq!(done.status.code(), Some(0), "{said}");
+    assert!(out.join("gt_oak_quantized_LOD4.glb").exists());
+}

@@ -10,6 +10,7 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use glam::{DMat3, Vec3};
+use rayon::prelude::*;
 
 use super::element::Element;
 use crate::space::eigen::Moments;
@@ -163,9 +164,13 @@ pub fn merge(elements: &[Element], locality: f64) -> Hierarchy {
         let cost = plane_error(&together, locality) - error[a as usize] - error[b as usize];
         Merge { cost, a, b }
     };
-    for b in 0..n as u32 {
+    let first = |b: u32| -> Vec<Merge> {
         let before = near[b as usize].iter().filter(|&&a| a < b);
-        waiting.add(b, before.map(|&a| merge_of(&moments, &error, a, b)));
+        before.map(|&a| merge_of(&moments, &error, a, b)).collect()
+    };
+    let first: Vec<Vec<Merge>> = (0..n as u32).into_par_iter().map(first).collect();
+    for (b, merges) in (0..).zip(first) {
+        waiting.add(b, merges.into_iter());
     }
     loop {
         while let Some(Merge { a, b, .. }) = waiting.pop(&alive) {
