@@ -66,6 +66,7 @@ pub mod scene;
 mod sharing;
 #[cfg(feature = "bake")]
 mod solid;
+#[cfg(feature = "bake")]
 pub mod space;
 #[cfg(feature = "bake")]
 pub mod species;
