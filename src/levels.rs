@@ -50,18 +50,29 @@ impl<'a> Levels<'a> {
             packed: Vec::with_capacity(ranges.len()),
             manifest,
         };
-        let all = scene_of_model(&tree.model, 0..tree.model.triangles.len() as u32);
+        let mut all = original(tree);
+        let triangles = all.triangles();
+        // It is as large as the tree and waits for the last level: `add_original` makes it again.
+        all.surfaces.clear();
         let level = manifest::Level {
             file: match out.shows_original() {
                 true => out.name(0) + ".glb",
                 false => String::new(),
             },
-            triangles: all.triangles(),
+            triangles,
             range: ranges[0],
             ..manifest::Level::default()
         };
         out.push(all, level);
         out
+    }
+
+    /// Gives level 0 its geometry, once all others are made.
+    pub fn add_original(&mut self) {
+        let level = &mut self.packed[0];
+        if level.shown {
+            level.scene.surfaces = original(self.tree).surfaces;
+        }
     }
 
     /// Adds the next level.
@@ -106,6 +117,11 @@ impl<'a> Levels<'a> {
     fn name(&self, level: usize) -> String {
         format!("{}_LOD{level}", self.tree.model.name)
     }
+}
+
+/// All of a tree as its file has it.
+fn original(tree: &Tree) -> Scene {
+    scene_of_model(&tree.model, 0..tree.model.triangles.len() as u32)
 }
 
 /// The rung with as many triangles as the request's error needs, if it bounds it.

@@ -228,6 +228,7 @@ fn levels(
     part(watch, "encode")?;
     levels.packed.last_mut().map_or(Ok(()), encode_images_of)?;
     let candidates = baker.candidates(tree.model.frame.radius);
+    levels.add_original();
     Ok(Made {
         packed: levels.packed,
         manifest: levels.manifest,

@@ -104,9 +104,9 @@ fn radius_integrals(tree: &Tree, chain: u32) -> [f32; 3] {
         })
 }
 
-/// Whether a chain is as thick as this on average: along its length, or over its bark, where a trunk that runs on as
-/// the midrib of a frond has all its weight below. Of a cone the second mean is 4/3 of the first.
-fn is_thick(tree: &Tree, chain: u32, radius: f32) -> bool {
+/// Whether a chain is thicker than `radius` (normalised units) on average: along its length, or over its bark, where a
+/// trunk that runs on as the midrib of a frond has all its weight below. Of a cone the second mean is 4/3 of the first.
+pub fn is_thick(tree: &Tree, chain: u32, radius: f32) -> bool {
     let [_, area, square] = radius_integrals(tree, chain);
     mean_radius(tree, chain) > radius || square > BARK_MEAN * radius * area
 }
@@ -146,6 +146,7 @@ pub fn elements(tree: &Tree) -> Vec<Element> {
             out.push(wood);
         }
     }
+    out.shrink_to_fit();
     out
 }
 

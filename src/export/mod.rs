@@ -20,6 +20,7 @@ mod manifest_cuts;
 pub mod manifest_tiles;
 pub mod matching;
 pub mod mip;
+mod neighbours;
 pub mod original;
 pub mod package;
 pub mod png;

@@ -19,7 +19,7 @@ use rayon::prelude::*;
 
 use super::chart::{Chart, Shape};
 use super::foliage::Foliage;
-use super::texel::Stored;
+use super::neighbours::follow_neighbours;
 
 /// The original from one direction, on a grid of cells.
 #[derive(Clone, Debug)]
@@ -54,14 +54,14 @@ const BATCH: usize = 512;
 
 /// For each texel of the page, the projected coverage corrected by the views' votes.
 pub fn refine(foliage: &Foliage, targets: &[&Target], options: Refine) -> Vec<f32> {
-    let mut score: Vec<f32> = foliage.texels.iter().map(Stored::coverage).collect();
-    let mut mean = vec![0.0f32; score.len()];
+    let mut mean = vec![0.0f32; foliage.texels.len()];
+    let score = |at: usize, mean: f32| foliage.texels[at].coverage() + options.weight * mean;
     let rows: Vec<Vec<u32>> = foliage.charts.iter().map(Chart::row_lengths).collect();
     // Windows show texels of others, and the rows of outlines' boxes hold some.
     let several = |c: &Chart| matches!(c.shape, Shape::Window | Shape::Mask(_));
     let overlap = foliage.charts.iter().any(several);
     for round in 0..options.rounds {
-        let on = Shown::new(foliage, &rows, |at| score[at] >= 0.5);
+        let on = Shown::new(foliage, &rows, |at| score(at, mean[at]) >= 0.5);
         // Views take turns, a third of them a round where there are rounds for all: a third of the
         // work, and on three trees no F1 fell by more than .004.
         let turns = options.rounds.min(3) as usize;
@@ -75,7 +75,6 @@ pub fn refine(foliage: &Foliage, targets: &[&Target], options: Refine) -> Vec<f3
         let step = 1.0 / (round as f32 + 1.0).sqrt();
         let mut settle = |at: usize, (sum, hits): Votes| {
             mean[at] += step * (sum / hits.max(1) as f32 - mean[at]);
-            score[at] = foliage.texels[at].coverage() + options.weight * mean[at];
         };
         if overlap {
             let mut sums: Vec<Votes> = vec![(0.0, 0); foliage.texels.len()];
@@ -90,8 +89,13 @@ pub fn refine(foliage: &Foliage, targets: &[&Target], options: Refine) -> Vec<f3
             on.each_vote(&asked, &opinions, settle);
         }
     }
-    follow_neighbours(&mut score, foliage);
-    score
+    // In place: a page of 4096 x 4096 has 67 MB of them.
+    let mut scores = mean;
+    let all = scores.par_iter_mut().enumerate();
+    all.for_each(|(at, mean)| *mean = score(at, *mean));
+    let width = foliage.size[0] as usize;
+    follow_neighbours(&mut scores, &foliage.owned, width);
+    scores
 }
 
 /// Sum of a texel's votes, and how many there are.
@@ -174,33 +178,6 @@ impl<'f> Shown<'f> {
                 }
             }
         }
-    }
-}
-
-/// Share of its neighbours' mean that a texel takes over.
-const NEIGHBOURS: f32 = 0.1;
-
-/// Ranks texels of equal score by their neighbours: where all views see other things in front of
-/// a texel it has no vote, and a threshold could take only all of these or none.
-fn follow_neighbours(score: &mut [f32], foliage: &Foliage) {
-    let width = foliage.size[0] as usize;
-    let mut before = vec![0.0f32; score.len()];
-    for _ in 0..3 {
-        before.copy_from_slice(score);
-        let rows = score.par_chunks_mut(width).enumerate();
-        rows.for_each(|(y, row)| {
-            for (x, value) in row.iter_mut().enumerate() {
-                if !foliage.owned[y * width + x] {
-                    continue;
-                }
-                let near = |at: usize, end: usize| at.saturating_sub(1)..(at + 2).min(end);
-                let cells = near(y, before.len() / width)
-                    .flat_map(|v| near(x, width).map(move |u| v * width + u))
-                    .filter(|&at| foliage.owned[at]);
-                let (sum, count) = cells.fold((0.0, 0.0), |(s, n), at| (s + before[at], n + 1.0));
-                *value += NEIGHBOURS / 3.0 * (sum / count - *value);
-            }
-        });
     }
 }
 

@@ -94,9 +94,10 @@ impl Baker<'_> {
             let charts = 0..foliage.charts.len();
             let taken = wood_scene(&taken);
             let targets = self.original.targets(pool, Some(&taken), charts.clone());
-            let targets: Vec<&Target> = targets.iter().collect();
+            let seen: Vec<&Target> = targets.iter().collect();
             part(watch, "fit texels")?;
-            let score = refine(&foliage, &targets, self.refining());
+            let score = refine(&foliage, &seen, self.refining());
+            drop(targets);
             part(watch, "match area")?;
             let kept = match self.recipe.sharing > 0.0 {
                 true => score.clone(),

@@ -30,8 +30,9 @@ pub fn heights(levels: &[Judged]) -> Vec<u32> {
     heights
 }
 
-/// Figures of every level at its own sizes, supersampled and as an engine draws it; the original
-/// as an engine draws it, at all of them. `step` is called after each of [`heights`].
+/// Figures of every level at its own sizes, supersampled and as an engine draws it. Of the original only what
+/// it costs is told: it has no error beside itself, and what an engine makes of it takes a tenth of a bake to draw
+/// (`pleach evaluate --client` does). `step` is called after each of [`heights`].
 ///
 /// # Errors
 /// Those of `step`.
@@ -55,7 +56,7 @@ pub fn judge(
         views: &settings.view_set(),
         lens: settings.lens,
         heights_px: &own,
-        original_px: &all,
+        original_px: &[],
         starts_px: &[],
         looks: false,
         client: true,
@@ -70,17 +71,10 @@ pub fn judge(
         step()?;
     }
     let measured = rows.split_off(1);
-    let mut whole = rows.pop();
-    // Of the original only what an engine makes of it is told: it has no error beside itself.
-    for size in whole.iter_mut().flat_map(|row| &mut row.sizes) {
-        if let Some(client) = size.client.take() {
-            *size = *client;
-        }
-    }
     Ok(Report {
         position_step_m: original.0.position_step,
         focal_px: settings.lens.focal_px(),
-        original: whole,
+        original: rows.pop(),
         levels: measured,
         ..Report::default()
     })

@@ -19,7 +19,7 @@ pub struct Report {
     /// longer lens from 1.5 radii). Absent where lines of sight are parallel.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub focal_px: Option<f64>,
-    /// The original, drawn as an engine draws it: what the levels replace.
+    /// The original: what the levels replace. Of a bake it has no sizes.
     pub original: Option<Level>,
     /// The levels, nearest first.
     pub levels: Vec<Level>,

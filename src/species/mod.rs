@@ -112,6 +112,7 @@ fn made(species: &Species, watch: &dyn Watch) -> Result<BakedSpecies> {
         .map(|(baker, t)| baker.candidates(t.tree.model.frame.radius))
         .collect();
     begin(watch, "write", 1)?;
+    levels.iter_mut().for_each(Levels::add_original);
     files.write(&trees, &levels)?;
     let mut report = SpeciesReport {
         name: name.clone(),

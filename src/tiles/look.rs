@@ -4,7 +4,7 @@ use crate::botany::tree::{Organ, Tree};
 use crate::cloud::coverage::{Coverage, coverage};
 use crate::cloud::foliage::{Face, Foliage};
 use crate::cloud::occlusion::Occlusion;
-use crate::detail::element::{Element, elements, mean_radius};
+use crate::detail::element::{Element, elements, is_thick};
 use crate::detail::merge::merge;
 use crate::detail::optimal_distance::TEXELS;
 use crate::detail::wood::Wood;
@@ -56,7 +56,7 @@ pub fn look(
     }
     let mut elements = elements(tree);
     for element in &mut elements {
-        let thick = |chain| mean_radius(tree, chain) * DENSITY >= SOLID_TEXELS;
+        let thick = |chain| is_thick(tree, chain, SOLID_TEXELS / DENSITY);
         element.solid = element.chain.is_some_and(thick);
     }
     let height_texels = DENSITY * tree.model.height();
