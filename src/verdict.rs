@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use crate::botany::stance::lies;
 use crate::botany::tree::Tree;
 use crate::describe::trunk;
 use crate::error::Error;
@@ -16,7 +17,8 @@ pub const REFUSED: &str = ".refused.json";
 
 /// What is wrong with the levels.
 pub fn in_band(tree: &Tree, rungs: &[Rung], judged: &[Judged], report: &Report) -> Vec<Fault> {
-    let trunk = Trunk::new(&tree.model, &trunk(tree));
+    let lies = lies(&tree.skeleton).is_some();
+    let trunk = Trunk::new(&tree.model, &trunk(tree), lies);
     let mut out = Vec::new();
     for ((rung, level), row) in rungs.iter().zip(judged).zip(&report.levels) {
         if row.triangles > rung.triangles {

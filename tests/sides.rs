@@ -1,4 +1,5 @@
-//! Leaves with pale undersides: cards whose sides differ visibly show each side's own colours.
+//! Leaves with pale undersides: cards whose sides differ visibly show each side's own colours. Leaves with one side: so have
+//! cards.
 
 use std::path::Path;
 
@@ -8,6 +9,7 @@ use pleach::botany::model::Image;
 use pleach::export::manifest::{Level, Manifest};
 use pleach::pipeline::{Limit, Request, Wanted, bake};
 use pleach::recipe::Recipe;
+use pleach::report::{Settings, evaluate};
 use pleach::scene::Scene;
 use pleach::space::glb::GlbBuilder;
 use pleach::watch::Unwatched;
@@ -18,7 +20,6 @@ const BUDGET: u64 = 200;
 
 /// A trunk, and leaves that lie nearly level: green above, red below, each side a sheet of its own.
 fn two_toned(file: &Path) {
-    let mut glb = GlbBuilder::default();
     let random = |i: u32, k: u32| ((i * 7919 + k * 104_729) as f32 * 0.618_034).fract() - 0.5;
     let (mut crown, mut above, mut below) = (Vec::new(), Vec::new(), Vec::new());
     for i in 0..300 {
@@ -49,6 +50,19 @@ fn two_toned(file: &Path) {
     {
         std::mem::swap(&mut above, &mut below);
     }
+    let sheets = [
+        ("leaf", [0.0, 0.5, 0.0, 1.0], above),
+        ("underside", [0.5, 0.0, 0.0, 1.0], below),
+    ];
+    write_tree(file, &crown, &sheets);
+}
+
+/// Name, colour and triangles of leaves that are drawn from their front alone.
+type Sheet = (&'static str, [f32; 4], Vec<[u32; 3]>);
+
+/// A trunk 5 m high with a crown.
+fn write_tree(file: &Path, crown: &[Vec3], sheets: &[Sheet]) {
+    let mut glb = GlbBuilder::default();
     let (mut wood, mut bark) = (Vec::new(), Vec::new());
     for ring in 0..6u32 {
         for side in 0..8u32 {
@@ -65,18 +79,16 @@ fn two_toned(file: &Path) {
         let indices = glb.indices(triangles, points.len());
         json!({ "attributes": { "POSITION": position }, "indices": indices, "material": material })
     };
-    let primitives = [
-        primitive(&wood, &bark, 0),
-        primitive(&crown, &above, 1),
-        primitive(&crown, &below, 2),
-    ];
+    let mut primitives = vec![primitive(&wood, &bark, 0)];
     let color = |name: &str, rgba: [f32; 4]| json!({ "name": name, "pbrMetallicRoughness": { "baseColorFactor": rgba } });
+    let mut materials = vec![color("bark", [0.3, 0.2, 0.1, 1.0])];
+    for (name, rgba, triangles) in sheets {
+        primitives.push(primitive(crown, triangles, materials.len() as u32));
+        materials.push(color(name, *rgba));
+    }
     let root = json!({
         "asset": { "version": "2.0" }, "scene": 0, "scenes": [{ "nodes": [0] }],
-        "nodes": [{ "mesh": 0 }], "meshes": [{ "primitives": primitives }],
-        "materials": [
-            color("bark", [0.3, 0.2, 0.1, 1.0]), color("leaf", [0.0, 0.5, 0.0, 1.0]), color("underside", [0.5, 0.0, 0.0, 1.0]),
-        ],
+        "nodes": [{ "mesh": 0 }], "meshes": [{ "primitives": primitives }], "materials": materials,
     });
     std::fs::write(file, glb.finish(root)).unwrap();
 }
@@ -204,4 +216,82 @@ fn a_side_that_the_scene_never_shows_gets_no_texels() {
             level.cards.len()
         );
     }
+}
+
+/// Leaves that stand upright and face +z, at most 45 degrees off, with one side or, in two layers, with two.
+fn facing_z(file: &Path, layers: bool) {
+    let random = |i: u32, k: u32| ((i * 7919 + k * 104_729) as f32 * 0.618_034).fract() - 0.5;
+    let (mut crown, mut triangles) = (Vec::new(), Vec::new());
+    for i in 0..300 {
+        let center = Vec3::new(random(i, 1), random(i, 2), random(i, 3)) * 4.0 + Vec3::Y * 6.0;
+        let facing = Vec3::new(random(i, 4), random(i, 5), 0.7).normalize();
+        let u = Vec3::Y.cross(facing).normalize() * 0.2;
+        let v = facing.cross(u);
+        let at = crown.len() as u32;
+        crown.extend([
+            center - u - v,
+            center + u - v,
+            center + u + v,
+            center - u + v,
+        ]);
+        for [a, b, c] in [[at, at + 1, at + 2], [at, at + 2, at + 3]] {
+            triangles.push([a, b, c]);
+            triangles.extend(layers.then_some([a, c, b]));
+        }
+    }
+    write_tree(file, &crown, &[("leaf", [0.0, 0.5, 0.0, 1.0], triangles)]);
+}
+
+/// The level of such a tree, beside the original.
+fn level_of(folder: &Path, layers: bool) -> [pleach::botany::Model; 2] {
+    let input = folder.join("tree.glb");
+    facing_z(&input, layers);
+    let request = Request {
+        input: input.clone(),
+        output: folder.join("package"),
+        wanted: Wanted::Limits(vec![Limit::Count(BUDGET)]),
+        recipe: Recipe::draft(),
+        ..Request::default()
+    };
+    bake(&request, &Unwatched).unwrap();
+    [input, folder.join("package/tree_LOD1.glb")].map(|file| load(&file).unwrap())
+}
+
+/// Whether a model's leaves or cards are drawn from both sides.
+fn is_double_sided(model: &pleach::botany::Model) -> bool {
+    let leafy = model.materials.iter().find(|m| m.name != "bark");
+    leafy.unwrap().double_sided
+}
+
+#[test]
+fn leaves_with_one_side_are_seen_from_that_side_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let [original, level] = level_of(folder.path(), false);
+    assert!(level.triangles.len() as u64 <= BUDGET);
+    assert!(!is_double_sided(&original) && !is_double_sided(&level));
+    let settings = Settings {
+        heights_px: vec![128],
+        elevations_deg: vec![0.0],
+        views: 5,
+        ..Settings::default()
+    };
+    let report = evaluate((&original, "tree"), &[(&level, "level")], &settings);
+    let views = &report.levels[0].sizes[0].views;
+    let of = |name: &str| views.iter().find(|v| v.view == name).unwrap();
+    // From the front the crown, from behind the trunk alone.
+    for (name, least) in [
+        ("azimuth 0 elevation 0", 0.75),
+        ("azimuth 180 elevation 0", 0.9),
+    ] {
+        let view = of(name);
+        assert!(view.f1 > least, "{view:?}");
+        assert!((0.85..1.15).contains(&view.area_ratio), "{view:?}");
+    }
+}
+
+#[test]
+fn two_layers_of_leaves_are_seen_from_both_sides() {
+    let folder = tempfile::tempdir().unwrap();
+    let [original, level] = level_of(folder.path(), true);
+    assert!(!is_double_sided(&original) && is_double_sided(&level));
 }

@@ -12,6 +12,7 @@ pub mod portrait;
 pub mod prototype;
 pub mod recognise;
 pub mod skeleton;
+pub mod stance;
 pub mod subtree;
 pub mod tree;
 

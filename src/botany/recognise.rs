@@ -3,7 +3,7 @@
 use super::model::Model;
 pub use super::organ::OrganRule;
 use super::tree::{NO_NODE, Organ, Tree};
-use super::{attach, leaf, organ, part, skeleton, subtree};
+use super::{attach, leaf, organ, part, skeleton, stance, subtree};
 use crate::error::{Error, Result};
 
 /// What the user may say about a model before it is recognised.
@@ -36,6 +36,7 @@ pub fn recognise(model: Model, options: &RecogniseOptions) -> Result<Tree> {
     let organs = mend_twigs(&mut parts, organs);
     let leaves = leaf::find(&model, &parts, &organs);
     let (skeleton, wood_node) = skeleton::build(&parts, &organs, &mut warnings);
+    warnings.extend(stance::lies(&skeleton).map(stance::warning));
     let mut tree = Tree {
         organ: parts
             .triangle_part

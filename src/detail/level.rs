@@ -21,6 +21,8 @@ pub struct LevelPlan {
     pub members: Vec<Vec<u32>>,
     /// Cards that are drawn once for each side, in order.
     pub sided: Vec<u32>,
+    /// Whether cards are seen from their front alone, as leaves whose material is not double-sided are.
+    pub one_sided: bool,
     /// Wood elements drawn as geometry: element and index of its choice.
     pub tubes: Vec<(u32, u32)>,
     /// Error of the cut, area times length squared, normalised units.
@@ -77,7 +79,7 @@ impl Planner<'_> {
     }
 
     /// The least-squares card of some elements.
-    pub(super) fn card(&self, members: &[u32]) -> CardGroup {
+    pub fn card(&self, members: &[u32]) -> CardGroup {
         let mut moments = Moments::default();
         for &e in members {
             moments = moments.merged(&self.elements[e as usize].moments);

@@ -3,6 +3,7 @@
 pub mod adapt;
 pub mod adaptive_level;
 pub mod element;
+pub mod facing;
 pub mod level;
 pub mod likeness;
 pub mod merge;

@@ -47,6 +47,8 @@ pub struct Foliage {
     pub texels: Vec<Stored>,
     /// Whether the texel belongs to a chart.
     pub owned: Vec<bool>,
+    /// Whether cards are seen from their front alone.
+    pub one_sided: bool,
     /// Final alpha of each texel; set from coverage by [`Foliage::threshold`] or by matching.
     pub alpha: Vec<u8>,
 }
@@ -75,6 +77,7 @@ impl Foliage {
             alpha: vec![0; texels.len()],
             charts,
             backs: Vec::new(),
+            one_sided: false,
             size,
             texels,
         }
@@ -264,7 +267,7 @@ pub fn first_of_page(images: &[Image]) -> Option<usize> {
 }
 
 /// The material of the cards; its images are numbered from `first_image`.
-pub fn material(first_image: u32, lit: bool) -> Material {
+pub fn material(first_image: u32, lit: bool, double_sided: bool) -> Material {
     let texture = |k: u32| {
         Some(TextureRef {
             image: first_image + k,
@@ -283,7 +286,7 @@ pub fn material(first_image: u32, lit: bool) -> Material {
         unlit: !lit,
         alpha_mode: AlphaMode::Mask,
         alpha_cutoff: 0.5,
-        double_sided: true,
+        double_sided,
         ..Material::default()
     }
 }

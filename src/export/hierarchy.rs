@@ -152,7 +152,7 @@ fn add_billboards(
         scenes.push((tile, scene, w > 0));
     }
     let page_scene = Scene {
-        materials: vec![foliage::material(0, lit)],
+        materials: vec![foliage::material(0, lit, true)],
         images: names
             .iter()
             .zip(texels)

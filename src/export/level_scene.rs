@@ -108,7 +108,7 @@ impl LevelScene {
                 .extend(part.triangles.iter().map(|t| t.map(|i| i + base)));
         }
         let [w, h] = foliage.size;
-        // Both have two sides, as they are written: thin twigs are ribbons of one sheet.
+        // As they are written: thin twigs are ribbons of one sheet.
         let opaque = Material {
             double_sided: true,
             ..Material::default()
@@ -116,6 +116,7 @@ impl LevelScene {
         let cut = Material {
             texture: Some(0),
             cutoff: Some(0.5),
+            double_sided: !foliage.one_sided,
             ..opaque
         };
         Self {

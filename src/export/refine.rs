@@ -139,14 +139,10 @@ impl<'f> Shown<'f> {
         let mut counts = vec![0u8; target.wanted.len()];
         for i in charts.clone() {
             let on = &self.on[i];
-            scan(
-                &self.foliage.charts[i],
-                &self.rows[i],
-                target,
-                |cell, texel| {
-                    counts[cell] = counts[cell].saturating_add(u8::from(on[texel]));
-                },
-            );
+            let chart = (&self.foliage.charts[i], &self.rows[i][..]);
+            scan(chart, self.foliage.one_sided, target, |cell, texel| {
+                counts[cell] = counts[cell].saturating_add(u8::from(on[texel]));
+            });
         }
         counts
     }
@@ -164,7 +160,8 @@ impl<'f> Shown<'f> {
             let of_chart = |i: usize| {
                 let seen = targets.iter().copied().zip(opinions);
                 let seen = seen.filter(|(target, _)| target.charts.contains(&i));
-                vote((&charts[i], &self.rows[i]), seen, &self.on[i])
+                let chart = (&charts[i], &self.rows[i][..]);
+                vote(chart, self.foliage.one_sided, seen, &self.on[i])
             };
             let votes: Vec<Vec<Votes>> = some.clone().into_par_iter().map(of_chart).collect();
             for (i, votes) in some.zip(votes) {
@@ -234,14 +231,15 @@ fn opinions(target: &Target, mut counts: Vec<u8>) -> Vec<u8> {
 }
 
 fn vote<'t>(
-    (chart, rows): (&Chart, &[u32]),
+    chart: (&Chart, &[u32]),
+    one_sided: bool,
     seen: impl Iterator<Item = (&'t Target, &'t Vec<u8>)>,
     on: &[bool],
 ) -> Vec<Votes> {
     let mut sums = vec![(0.0f32, 0u32); on.len()];
     let said = &*SAID;
     for (target, opinions) in seen {
-        scan(chart, rows, target, |cell, texel| {
+        scan(chart, one_sided, target, |cell, texel| {
             let (sum, hits) = &mut sums[texel];
             *sum += said[usize::from(opinions[cell])][usize::from(on[texel])];
             *hits += 1;
@@ -251,15 +249,20 @@ fn vote<'t>(
 }
 
 /// Visits every cell whose centre the card covers, with the chart's texel that lies there; `rows` are
-/// the chart's [`Chart::row_lengths`].
-fn scan(chart: &Chart, rows: &[u32], target: &Target, mut visit: impl FnMut(usize, usize)) {
+/// the chart's [`Chart::row_lengths`]. A card that is `one_sided` covers nothing where its back is seen.
+fn scan(
+    (chart, rows): (&Chart, &[u32]),
+    one_sided: bool,
+    target: &Target,
+    mut visit: impl FnMut(usize, usize),
+) {
     let cell = |p: Vec3| target.base + Vec2::new(p.dot(target.right), p.dot(target.down));
     let corner: Vec<Vec2> = chart.corners.iter().map(|&p| cell(p)).collect();
     let texel: Vec<Vec2> = chart.corners[..3].iter().map(|&p| chart.texel(p)).collect();
     let (a, b) = (corner[1] - corner[0], corner[2] - corner[0]);
     let area = a.perp_dot(b);
-    // Seen edge-on the card covers nothing that a cell could vote on.
-    if area.abs() < 0.05 {
+    // Seen edge-on the card covers nothing that a cell could vote on. Rows run down: fronts turn clockwise.
+    if area.abs() < 0.05 || one_sided && area > 0.0 {
         return;
     }
     let (ta, tb) = (texel[1] - texel[0], texel[2] - texel[0]);

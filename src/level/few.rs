@@ -38,7 +38,7 @@ impl Baker<'_> {
     }
 
     /// F1 against the original's silhouettes, mean over the training views.
-    fn agreement(&self, fitted: &Fitted) -> f64 {
+    pub(super) fn agreement(&self, fitted: &Fitted) -> f64 {
         let charts = 0..fitted.foliage.charts.len();
         let targets = self.targets(fitted, charts.clone());
         f1(&fitted.foliage, charts, &targets)

@@ -5,7 +5,7 @@ use std::ops::Range;
 use glam::Vec2;
 
 use super::{Baker, Level, LevelRequest};
-use crate::botany::model::Image;
+use crate::botany::model::{Image, Material};
 use crate::detail::level::LevelPlan;
 use crate::error::Result;
 use crate::export::atlas::Layout;
@@ -80,6 +80,7 @@ impl Baker<'_> {
                 samples: self.recipe.samples,
             },
         );
+        foliage.one_sided = plan.one_sided;
         let goal = self.goal(request);
         let pool = self.pool(request);
         // Where the wood alone covers more than the original, no alpha can make up for it (bare
@@ -226,8 +227,9 @@ impl Fitted {
             .add_backs(GAP_PX * original.height / self.request.height_px);
         self.foliage.bleed();
         let surface = self.foliage.surface(0..self.foliage.charts.len());
+        let material = |first: u32| foliage::material(first, lit, !self.plan.one_sided);
         Level {
-            scene: on_page(self.wood, surface, self.foliage.images(lit), lit),
+            scene: on_page(self.wood, surface, self.foliage.images(lit), material),
             request: self.request,
             plan: self.plan,
             matched: self.matched,
@@ -246,15 +248,20 @@ impl Fitted {
     }
 }
 
-/// Wood with cards, whose images come last.
-pub(super) fn on_page(wood: Scene, mut cards: Surface, images: Vec<Image>, lit: bool) -> Scene {
+/// Wood with cards, whose images come last: of a `material` that knows the first one's number.
+pub(super) fn on_page(
+    wood: Scene,
+    mut cards: Surface,
+    images: Vec<Image>,
+    material: impl Fn(u32) -> Material,
+) -> Scene {
     let mut scene = wood;
-    if !lit {
+    let material = material(scene.images.len() as u32);
+    if material.unlit {
         // They are for normal maps.
         cards.tangents.clear();
     }
     cards.material = scene.materials.len() as u32;
-    let material = foliage::material(scene.images.len() as u32, lit);
     scene.materials.push(material);
     scene.images.extend(images);
     scene.surfaces.push(cards);

@@ -1,5 +1,6 @@
 //! One level of a package: which wood and cards draw it, their texels, and its covered area.
 
+mod facing;
 mod few;
 mod fit;
 mod share;
@@ -176,6 +177,18 @@ impl Baker<'_> {
     /// # Errors
     /// [`Error::Interrupted`](crate::error::Error::Interrupted).
     pub fn fitted(&self, request: LevelRequest, watch: &dyn Watch) -> Result<Option<Fitted>> {
+        match self.seen_from_both_sides(request, watch)? {
+            Some(made) => self.facing(made, request, watch).map(Some),
+            None => Ok(None),
+        }
+    }
+
+    /// As [`Baker::fitted`], of cards that show their leaves from both sides.
+    fn seen_from_both_sides(
+        &self,
+        request: LevelRequest,
+        watch: &dyn Watch,
+    ) -> Result<Option<Fitted>> {
         part(watch, "cut")?;
         if self.recipe.method == Method::CrossedQuads {
             let count = (request.triangles / 2).clamp(1, MOST_CROSSED) as usize;
@@ -233,18 +246,7 @@ impl Baker<'_> {
             return None;
         }
         let choices = self.choices();
-        let planner = Planner {
-            model: &self.tree.model,
-            elements: self.elements,
-            hierarchy: self.hierarchy,
-            choices: &choices,
-            outline: self.outline(),
-            reassign: Reassign {
-                rounds: self.recipe.reassign_rounds,
-                locality: self.recipe.locality,
-                neighbours: 12,
-            },
-        };
+        let planner = self.planner(&choices);
         if self.recipe.method == Method::OptimalCut {
             return self.sided(request.triangles, |budget| planner.plan(budget));
         }
@@ -271,6 +273,21 @@ impl Baker<'_> {
         let occlusion = Occlusion::of_leaves(&centers, self.tree.model.height());
         let plan = adaptive_level(&planner, self.tree, &occlusion, cut, options);
         Some(plan)
+    }
+
+    fn planner<'c>(&'c self, choices: &'c [Vec<Choice>]) -> Planner<'c> {
+        Planner {
+            model: &self.tree.model,
+            elements: self.elements,
+            hierarchy: self.hierarchy,
+            choices,
+            outline: self.outline(),
+            reassign: Reassign {
+                rounds: self.recipe.reassign_rounds,
+                locality: self.recipe.locality,
+                neighbours: 12,
+            },
+        }
     }
 
     fn outline(&self) -> Outline {

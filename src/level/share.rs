@@ -7,6 +7,7 @@ use super::{Baker, Level};
 use crate::error::Result;
 use crate::export::atlas::MAX_SIDE;
 use crate::export::coarser::coarsen_light;
+use crate::export::foliage::material;
 use crate::export::level_scene::AreaGoal;
 use crate::export::matching::{CONTRAST_GUESS, Matched, Standing, match_area};
 use crate::export::refine::{Target, f1, refine};
@@ -251,11 +252,12 @@ impl Page {
             finer,
             farthest,
         } = &self.shared;
+        let material = |first: u32| material(first, lit, true);
         let level = |(guest, charts): (&Guest, Range<usize>)| {
             let fitted = guest.fitted;
             let surface = foliage.surface(charts.clone());
             Level {
-                scene: on_page(fitted.wood.clone(), surface, images.clone(), lit),
+                scene: on_page(fitted.wood.clone(), surface, images.clone(), material),
                 request: fitted.request,
                 plan: fitted.plan.clone(),
                 matched: self.matched,

@@ -64,7 +64,7 @@ impl Baker<'_> {
     /// Turns cards of which only the back is seen: texels are those of the front.
     pub(super) fn face_the_eye(&self, plan: &mut LevelPlan) {
         let eyes = &self.original.eyes;
-        if eyes.are_everywhere() {
+        if eyes.are_everywhere() || plan.one_sided {
             return;
         }
         for group in &mut plan.cards {
@@ -75,7 +75,7 @@ impl Baker<'_> {
     }
 
     /// Triangles of a plan.
-    fn cost(&self, plan: &LevelPlan) -> u64 {
+    pub(super) fn cost(&self, plan: &LevelPlan) -> u64 {
         let cards = plan.cards.iter().map(|g| g.card.triangles() as u64);
         let tubes = plan.tubes.iter().filter_map(|&(element, choice)| {
             let chain = self.elements[element as usize].chain?;

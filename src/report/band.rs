@@ -3,8 +3,8 @@
 use super::drawable::Drawable;
 use super::judge::Judged;
 use super::schema::Level;
-use crate::botany::Model;
 use crate::botany::model::AlphaMode;
+use crate::botany::{Model, stance};
 use crate::space::raster::{Camera, Geometry, Sampling, Scene, coverage};
 use crate::space::texture::{cutoff, nearest};
 use crate::space::view::View;
@@ -77,7 +77,7 @@ pub fn faults(original: &Model, level: &Judged, row: &Level, trunk: Option<&Trun
                     "{:.0} % of the trunk is left in view {view:?}",
                     share * 100.0
                 ),
-                "give the level more triangles",
+                trunk.help,
             );
         }
     }
@@ -127,6 +127,8 @@ fn empty_share(model: &Model) -> f64 {
 pub struct Trunk {
     /// For each triangle, whether it is the trunk's.
     is_trunk: Vec<bool>,
+    /// Which knob helps where it is lost.
+    help: &'static str,
 }
 
 /// Triangles and their materials.
@@ -144,13 +146,18 @@ fn only<'a>(whole: &Scene<'a>, (triangles, triangle_material): &'a Part) -> Scen
 }
 
 impl Trunk {
-    /// `None` where there is no trunk.
-    pub fn new(original: &Model, trunk: &[u32]) -> Option<Self> {
+    /// `None` where there is no trunk; `lies` says that it does not stand upright.
+    pub fn new(original: &Model, trunk: &[u32], lies: bool) -> Option<Self> {
         let mut is_trunk = vec![false; original.triangles.len()];
         for &t in trunk {
             is_trunk[t as usize] = true;
         }
-        (!trunk.is_empty()).then_some(Self { is_trunk })
+        let help = match lies {
+            // Whole-tree billboards stand upright.
+            true => stance::HELP,
+            false => "give the level more triangles",
+        };
+        (!trunk.is_empty()).then_some(Self { is_trunk, help })
     }
 
     /// Least share of the trunk's free pixels that a level covers over two sides, and the side.
