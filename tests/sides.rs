@@ -9,6 +9,7 @@ use pleach::botany::model::Image;
 use pleach::export::manifest::{Level, Manifest};
 use pleach::pipeline::{Limit, Request, Wanted, bake};
 use pleach::recipe::Recipe;
+use pleach::report::schema::Report;
 use pleach::report::{Settings, evaluate};
 use pleach::scene::Scene;
 use pleach::space::glb::GlbBuilder;
@@ -177,6 +178,19 @@ fn a_card_is_green_from_above_and_red_from_below() {
         "{seen} of {}",
         level.cards.len()
     );
+}
+
+#[test]
+fn second_sides_make_no_crown_larger() {
+    let folder = tempfile::tempdir().unwrap();
+    let area = |second_sides: bool| {
+        baked(folder.path(), second_sides);
+        let report = std::fs::read_to_string(folder.path().join("package/report.json")).unwrap();
+        let report: Report = serde_json::from_str(&report).unwrap();
+        report.levels[0].sizes[0].area_ratio.mean
+    };
+    let [sided, plain] = [area(true), area(false)];
+    assert!((sided - plain).abs() < 0.015, "{sided} beside {plain}");
 }
 
 #[test]

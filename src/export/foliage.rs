@@ -137,6 +137,19 @@ impl Foliage {
         self.backs = sided.iter().copied().zip(backs).collect();
     }
 
+    /// Charts and alpha alone, to try what becomes of them.
+    pub fn without_texels(&self) -> Self {
+        Self {
+            charts: self.charts.clone(),
+            backs: self.backs.clone(),
+            size: self.size,
+            texels: Vec::new(),
+            owned: self.owned.clone(),
+            one_sided: self.one_sided,
+            alpha: self.alpha.clone(),
+        }
+    }
+
     /// Draws the backs of cards that have one: they take over the fronts' alpha, and both sides move apart by
     /// `gap` (normalised units), so that each hides the other.
     pub fn add_backs(&mut self, gap: f32) {

@@ -28,6 +28,18 @@ pub struct AreaGoal {
     pub far_area: f64,
 }
 
+impl AreaGoal {
+    /// The same from all cameras, of areas so many times smaller.
+    pub fn over(&self, factor: f64) -> Self {
+        Self {
+            near_area: self.near_area / factor,
+            own_area: self.own_area / factor,
+            far_area: self.far_area / factor,
+            ..self.clone()
+        }
+    }
+}
+
 /// One sample a pixel of the base level: errors at edges cancel over a picture and many views.
 const NEAR: Sampling = Sampling {
     side: 1,

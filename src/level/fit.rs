@@ -104,12 +104,20 @@ impl Baker<'_> {
                 true => score.clone(),
                 false => Vec::new(),
             };
+            let again = (!foliage.backs.is_empty()).then(|| score.clone());
             let standing = Standing {
                 charts,
                 wood: &wood.surfaces,
                 goal: &goal,
             };
-            let matched = match_area(&mut foliage, score, &[standing], guess);
+            let mut matched =
+                match_area(&mut foliage, score, std::slice::from_ref(&standing), guess);
+            if let Some(score) = again {
+                let grown = grown(&foliage, &wood.surfaces, &goal, gap(self.original, request));
+                let goal = &goal.over(grown);
+                let smaller = Standing { goal, ..standing };
+                matched = match_area(&mut foliage, score, &[smaller], matched.contrast);
+            }
             tries += 1;
             guess = matched.contrast;
             let over = matched.near_ratio;
@@ -200,6 +208,23 @@ impl Baker<'_> {
     }
 }
 
+/// Distance of the two sides of a card that has a texture for each, normalised units.
+fn gap(original: &Original, request: LevelRequest) -> f32 {
+    GAP_PX * original.height / request.height_px
+}
+
+/// What a level covers with its second sides over what it covers without: they stand `gap` off the first ones, and
+/// from aside each card is as much wider.
+fn grown(foliage: &Foliage, wood: &[Surface], goal: &AreaGoal, gap: f32) -> f64 {
+    let area = |foliage: &Foliage| {
+        let level = LevelScene::new(foliage, 0..foliage.charts.len(), wood);
+        level.near_areas(&goal.near).iter().sum::<f64>()
+    };
+    let mut both = foliage.without_texels();
+    both.add_backs(gap);
+    area(&both) / area(foliage).max(1.0)
+}
+
 impl Fitted {
     /// The least covered area of all training views, over the original's.
     pub(super) fn least_view(&self, original: &Original) -> f64 {
@@ -223,8 +248,7 @@ impl Fitted {
 
     /// Bleeds the texels and joins wood and cards.
     pub(super) fn level(mut self, original: &Original, lit: bool) -> Level {
-        self.foliage
-            .add_backs(GAP_PX * original.height / self.request.height_px);
+        self.foliage.add_backs(gap(original, self.request));
         self.foliage.bleed();
         let surface = self.foliage.surface(0..self.foliage.charts.len());
         let material = |first: u32| foliage::material(first, lit, !self.plan.one_sided);
