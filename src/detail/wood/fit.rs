@@ -24,16 +24,11 @@ pub struct Ring {
 pub(super) struct Fit {
     /// Rings from base to tip.
     pub rings: Vec<Ring>,
-    /// Integral over the surface of squared displacement: of the centre, and [`THICKNESS`] times of the radius.
+    /// Integral over the surface of squared displacement (centre and radius).
     pub displacement: f64,
-    /// Integral over the surface of the path's squared radius: the scale of a polygon's deviation.
+    /// Integral over the surface of the squared radius: the scale of a polygon's deviation.
     pub roundness: f64,
 }
-
-/// What an error of the radius weighs over one as long of the centre: where a rod is drawn as a spike, half of it is
-/// missing and not just displaced. Measured at 3 % on airy trees: with 1 the bars of a trellis become spikes (10 %: F1
-/// .886, with 9 .894) and a bare birch loses .006; with 100 its 10 % level loses .002 to tubes of too many triangles.
-const THICKNESS: f64 = 9.0;
 
 /// Fits rings at `knots` (first and last point included); `pointed` closes the tip.
 pub(super) fn fit(path: &Path, samples: &[Sample], knots: &[u32], pointed: bool) -> Fit {
@@ -66,11 +61,8 @@ pub(super) fn fit(path: &Path, samples: &[Sample], knots: &[u32], pointed: bool)
     for (sample, &(span, t)) in samples.iter().zip(&spans) {
         let at = |r: &Ring| r.center.extend(r.radius);
         let fitted = at(&rings[span]).lerp(at(&rings[span + 1]), t);
-        let off = sample.value - fitted;
-        displacement +=
-            sample.weight * (off.truncate().length_squared() + THICKNESS * off.w * off.w);
-        // Of the fitted radius, spikes would be as good as ribbons: what they lack in roundness makes up for it.
-        roundness += sample.weight * sample.value.w * sample.value.w;
+        displacement += sample.weight * (sample.value - fitted).length_squared();
+        roundness += sample.weight * fitted.w * fitted.w;
     }
     Fit {
         rings,
