@@ -298,6 +298,13 @@ fn a_reader_that_goes_away_is_no_fault() {
 #[test]
 fn an_input_that_changes_while_it_is_read_is_one_of_its_versions_or_an_error() {
     use std::sync::atomic::{AtomicBool, Ordering};
+    /// Ends the writer also where an assertion fails, instead of leaving the test waiting for it.
+    struct Over<'a>(&'a AtomicBool);
+    impl Drop for Over<'_> {
+        fn drop(&mut self) {
+            self.0.store(true, Ordering::Relaxed);
+        }
+    }
     let (home, tree) = home();
     let one = std::fs::read(&tree).unwrap();
     let grown = Command::new(env!("CARGO_BIN_EXE_pleach"))
@@ -313,7 +320,7 @@ fn an_input_that_changes_while_it_is_read_is_one_of_its_versions_or_an_error() {
     std::thread::scope(|scope| {
         scope.spawn(|| {
             // In place: cut off, half-written or whole when it is read.
-            for version in versions.iter().cycle() {
+            for (round, version) in versions.iter().cycle().enumerate() {
                 if over.load(Ordering::Relaxed) {
                     return;
                 }
@@ -322,9 +329,12 @@ fn an_input_that_changes_while_it_is_read_is_one_of_its_versions_or_an_error() {
                 std::io::Write::write_all(&mut file, start).unwrap();
                 std::thread::yield_now();
                 std::io::Write::write_all(&mut file, end).unwrap();
-                std::thread::sleep(Duration::from_millis(2));
+                // Sometimes long enough for a reader to be sure.
+                let pause_ms = if round % 8 == 7 { 100 } else { 2 };
+                std::thread::sleep(Duration::from_millis(pause_ms));
             }
         });
+        let _over = Over(&over);
         for round in 0..8 {
             let output = home.path().join(format!("out{round}"));
             let code = start(&tree, &output, "300").wait().unwrap().code();
@@ -344,7 +354,6 @@ fn an_input_that_changes_while_it_is_read_is_one_of_its_versions_or_an_error() {
                 other => panic!("round {round}: {other:?}"),
             }
         }
-        over.store(true, Ordering::Relaxed);
     });
     println!("{baked} of 8 were read whole");
     // Once nobody writes any more, it is a tree like any other.

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use super::json::Document;
+use super::settled::read_settled;
 use super::warning::Warnings;
 use super::{Limits, fault};
 use crate::{Error, Result};
@@ -51,8 +52,7 @@ const HARMLESS: &[&str] = &[
 
 /// Reads a file of bounded size; folders, pipes and devices are refused.
 pub(super) fn read_file(path: &Path, limits: &Limits) -> Result<Vec<u8>> {
-    let io = |doing| move |source| Error::io(path, doing, source);
-    let meta = std::fs::metadata(path).map_err(io("open"))?;
+    let meta = std::fs::metadata(path).map_err(|source| Error::io(path, "open", source))?;
     if !meta.is_file() {
         return Err(fault(
             path,
@@ -73,7 +73,7 @@ pub(super) fn read_file(path: &Path, limits: &Limits) -> Result<Vec<u8>> {
             "split the scene: one tree a file; or raise bytes in the recipe's limits",
         ));
     }
-    std::fs::read(path).map_err(io("read"))
+    read_settled(path)
 }
 
 /// Splits a file into its JSON and its binary chunk.

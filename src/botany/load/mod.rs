@@ -24,6 +24,7 @@ mod meshopt;
 mod normalise;
 mod primitive;
 mod scene;
+mod settled;
 mod skin;
 mod triangle;
 mod unseen;
