@@ -9,13 +9,6 @@ use super::rings::{removal_order, samples};
 /// Options that a curve keeps at most.
 const MOST_OPTIONS: usize = 12;
 
-/// What stands for the mean squared deviation of a ribbon from a circle of radius one. The
-/// circle's points have the mean squared height 1/2 over the ribbon's plane; as much again is for
-/// the change with the direction of view. Measured at 3 % of the wood's triangles: with 1/2
-/// trunks become ribbons and a view loses a fifth of the covered area; with 4 twigs become
-/// three-sided too soon and F1 falls by up to .06.
-const RIBBON_DEVIATION: f64 = 1.0;
-
 /// The options of a chain.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ChainCurve {
@@ -182,13 +175,13 @@ fn offer(options: &mut Vec<Candidate>, fit: &Fit, index: usize, pointed: bool, d
             (true, true) => 2,
             _ => sides,
         };
-        let deviation = match ribbon {
-            true => RIBBON_DEVIATION,
-            false => polygon_deviation(sides),
+        let error = match ribbon {
+            true => fit.flat,
+            false => fit.displacement + polygon_deviation(sides) * fit.roundness,
         };
         options.push(Candidate {
             triangles: width * quads,
-            error: (fit.displacement + deviation * fit.roundness) / 2.0,
+            error: error / 2.0,
             fit: Some(index),
             sides,
             two_faces,

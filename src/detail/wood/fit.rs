@@ -28,7 +28,24 @@ pub(super) struct Fit {
     pub displacement: f64,
     /// Integral over the surface of the squared radius: the scale of a polygon's deviation.
     pub roundness: f64,
+    /// What a flat piece is off in place of both: [`THICKNESS`] times as much for errors of the radius, and the scale of
+    /// its deviation by the path's own radius. By the fitted radius spikes would be as good for rods as ribbons: what
+    /// they lack in roundness makes up for what their taper misses.
+    pub flat: f64,
 }
+
+/// What stands for the mean squared deviation of a ribbon from a circle of radius one. The
+/// circle's points have the mean squared height 1/2 over the ribbon's plane; as much again is for
+/// the change with the direction of view. Measured at 3 % of the wood's triangles: with 1/2
+/// trunks become ribbons and a view loses a fifth of the covered area; with 4 twigs become
+/// three-sided too soon and F1 falls by up to .06.
+const RIBBON_DEVIATION: f64 = 1.0;
+
+/// What an error of the radius of a flat piece weighs over one as long of the centre: where a rod is drawn as a spike,
+/// half of it is missing and not just displaced. Tubes are never spikes: what they are off is as it was measured above.
+/// Measured with 1: at 10 % the bars of EZ-Tree's trellis become spikes (F1 .889, with 9 .901), and a bare birch loses
+/// .001 at 3 %; seven other trees are the same to the third digit.
+const THICKNESS: f64 = 9.0;
 
 /// Fits rings at `knots` (first and last point included); `pointed` closes the tip.
 pub(super) fn fit(path: &Path, samples: &[Sample], knots: &[u32], pointed: bool) -> Fit {
@@ -57,17 +74,22 @@ pub(super) fn fit(path: &Path, samples: &[Sample], knots: &[u32], pointed: bool)
             },
         })
         .collect();
-    let (mut displacement, mut roundness) = (0.0, 0.0);
+    let (mut displacement, mut roundness, mut flat) = (0.0, 0.0, 0.0);
     for (sample, &(span, t)) in samples.iter().zip(&spans) {
         let at = |r: &Ring| r.center.extend(r.radius);
         let fitted = at(&rings[span]).lerp(at(&rings[span + 1]), t);
-        displacement += sample.weight * (sample.value - fitted).length_squared();
+        let off = sample.value - fitted;
+        displacement += sample.weight * off.length_squared();
         roundness += sample.weight * fitted.w * fitted.w;
+        let (astray, thick) = (off.truncate().length_squared(), off.w * off.w);
+        let deviation = RIBBON_DEVIATION * sample.value.w * sample.value.w;
+        flat += sample.weight * (astray + THICKNESS * thick + deviation);
     }
     Fit {
         rings,
         displacement,
         roundness,
+        flat,
     }
 }
 

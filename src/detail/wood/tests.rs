@@ -180,6 +180,25 @@ fn a_straight_taper_needs_one_segment() {
 }
 
 #[test]
+fn a_rod_becomes_a_ribbon_and_a_cone_a_spike() {
+    let flat = |r0: f32, r1: f32| -> Vec<(u32, f64)> {
+        let tree = tree_of(&line(60, r0, r1, 0.0), 8);
+        let options = Wood::new(&tree, true).tube_options(0).options.clone();
+        let flat = options.iter().filter(|o| !o.is_round());
+        flat.map(|o| (o.triangles, o.error)).collect()
+    };
+    // Of the best spike for a rod of radius r the radius is 1.5 r at the foot: its mean squared error is r^2 / 4, which
+    // weighs nine times, and a ribbon's deviation from a circle is r^2 for both.
+    let rod = flat(0.02, 0.02);
+    let [(1, spike), (2, ribbon)] = rod[..] else {
+        panic!("{rod:?}");
+    };
+    assert!((spike / ribbon - 3.25).abs() < 0.05, "{}", spike / ribbon);
+    let cone = flat(0.02, 0.0);
+    assert!(matches!(cone[..], [(1, _)]), "{cone:?}");
+}
+
+#[test]
 fn least_squares_beat_chords_sixfold_on_a_parabola() {
     // Sagitta h: the chord's mean squared deviation is 8/15 h^2; with the foot pinned the best
     // line through it has 2/15 h^2 less the share that its free end gains.
