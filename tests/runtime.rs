@@ -153,10 +153,7 @@ fn every_leaf_is_under_exactly_one_drawn_node_in_every_frame() {
     let mut cut = ActiveCut::new(
         hierarchy.clone(),
         Place::at(Vec3::new(8.0, 0.0, 8.0)),
-        Hidden {
-            inner: Density::default(),
-            occlusion: Occlusion::new(&cells, Law::Beer),
-        },
+        Hidden::new(Density::default(), Occlusion::new(&cells, Law::Beer)),
     );
     cut.fade = 0.0;
     let (mut drawn, mut sizes) = (Vec::new(), std::collections::BTreeSet::new());
@@ -214,11 +211,10 @@ fn a_cut_that_follows_is_the_cut_made_anew() {
 fn so_it_is_where_cells_hide_what_is_behind() {
     let cells = cells();
     for law in [Law::Beer, Law::Equation4] {
-        follows(Hidden {
-            inner: Density::default(),
-            occlusion: Occlusion::new(&cells, law),
-        });
+        follows(Hidden::new(Density::default(), Occlusion::new(&cells, law)));
     }
+    let hidden = Hidden::new(Plain, Occlusion::new(&cells, Law::Beer));
+    follows(hidden.expecting(3e-3));
 }
 
 #[test]
@@ -399,10 +395,7 @@ fn cameras_inside_at_infinity_and_without_a_field_of_view_have_an_answer() {
     let mut forest = Forest::new(
         vec![species(1)],
         &places,
-        Hidden {
-            inner: Density::default(),
-            occlusion: Occlusion::new(&cells, Law::Beer),
-        },
+        Hidden::new(Density::default(), Occlusion::new(&cells, Law::Beer)),
     );
     let mut first = Vec::new();
     forest.update(&inside);
@@ -464,10 +457,7 @@ fn no_frame_allocates_after_the_path_was_walked_from_start_to_start() {
     let mut forest = Forest::new(
         vec![species(1), species(2)],
         &places(200, 6.0, 2),
-        Hidden {
-            inner: Density::default(),
-            occlusion: Occlusion::new(&cells, Law::Beer),
-        },
+        Hidden::new(Density::default(), Occlusion::new(&cells, Law::Beer)),
     );
     let mut spender = pleach::runtime::Spender::default();
     let items: Vec<pleach::runtime::Item> = (0..500)

@@ -188,10 +188,7 @@ fn cuts_of_a_real_hierarchy_draw_every_leaf_once_and_cost_less_with_occlusion() 
     let path = approach(&place, 60);
     let shown: Vec<usize> = (0..60).collect();
     let density = Density::default();
-    let hidden = Hidden {
-        inner: density,
-        occlusion: Occlusion::new(&cells, Law::Beer),
-    };
+    let hidden = Hidden::new(density, Occlusion::new(&cells, Law::Beer));
     let walks = [
         stand.walk(Plain, &path, &shown),
         stand.walk(density, &path, &shown),

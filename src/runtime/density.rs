@@ -86,6 +86,7 @@ mod tests {
     fn node(branch: Vec3, density: f32) -> Node {
         Node {
             center: branch * 2.0,
+            radius: 1.0,
             switch_distance: 10.0,
             branch,
             density,

@@ -55,6 +55,8 @@ impl Default for Subtree {
 pub struct Node {
     /// Centre of the bounding sphere.
     pub center: Vec3,
+    /// Its radius.
+    pub radius: f32,
     /// Nearer than this the node is opened: children, or geometry, stand for it.
     pub switch_distance: f32,
     /// Unit direction of the order-1 branch; zero where there is none.
@@ -152,6 +154,7 @@ impl Hierarchy {
     fn push(&mut self, subtree: &Subtree, index: u32, parent: u32) -> u32 {
         self.nodes.push(Node {
             center: subtree.center,
+            radius: subtree.radius,
             switch_distance: subtree.switch_distance,
             branch: subtree.branch,
             density: subtree.density,
@@ -175,7 +178,8 @@ impl Hierarchy {
         });
         self.push(subtree, index, parent);
         let node = &mut self.nodes[parent as usize + 1];
-        (node.center, node.switch_distance) = (own.center, own.switch_distance);
+        (node.center, node.radius) = (own.center, own.radius);
+        node.switch_distance = own.switch_distance;
         node.end = parent + 2;
         let origin = &mut self.origins[parent as usize + 1];
         (origin.own, origin.leaves) = (true, leaves);

@@ -10,9 +10,6 @@ use std::sync::{Arc, Mutex, PoisonError};
 use glam::{IVec3, Vec3};
 
 use super::cells::Cells;
-use super::hierarchy::Node;
-use super::place::Place;
-use super::visibility::{Sight, Visibility};
 use super::walk::{Law, walk};
 
 /// Occlusion probabilities seen from one eye. Clones share what they compute, on any thread: while their eyes are in one
@@ -165,6 +162,13 @@ impl<'g> Occlusion<'g> {
         value
     }
 
+    /// Middle of the eye's cell, and how far off in it an eye may be.
+    pub(super) fn eye(&self) -> (Vec3, f32) {
+        let edge = self.cells.edge();
+        let middle = self.cells.low() + (self.eye.as_vec3() + 0.5) * edge;
+        (middle, 0.5 * edge.length())
+    }
+
     /// Walks over the grid so far, without those of clones.
     pub fn computed(&self) -> u64 {
         self.computed
@@ -173,46 +177,6 @@ impl<'g> Occlusion<'g> {
     /// Number that changes with the eye's cell.
     pub fn stamp(&self) -> u32 {
         self.stamp
-    }
-}
-
-/// Equation 5: the level of detail between the one that the view alone asks for and the lowest,
-/// `(1 - OP) * view + OP * lowest`. Any measure of detail that grows with it will do; cuts use one
-/// over the distance, with 0 for the lowest.
-#[inline]
-pub fn blend(view: f32, lowest: f32, occlusion: f32) -> f32 {
-    (1.0 - occlusion) * view + occlusion * lowest
-}
-
-/// Another estimator, and what the grid hides besides.
-///
-/// Detail is one over the distance at which it is worth its cost, and the lowest is none, so
-/// equation 5 makes `1 / d` to `(1 - OP) / d`: a hidden sub-tree counts as `1 / (1 - OP)` times as far off.
-#[derive(Clone, Debug)]
-pub struct Hidden<'g, V> {
-    /// What is known without the grid.
-    pub inner: V,
-    /// Probabilities, cached for each cell.
-    pub occlusion: Occlusion<'g>,
-}
-
-impl<V: Visibility> Visibility for Hidden<'_, V> {
-    #[inline]
-    fn sight(&mut self, node: &Node, index: u32, eye: Vec3, place: &Place) -> Sight {
-        self.inner.sight(node, index, eye, place)
-    }
-
-    #[inline]
-    fn occlusion(&mut self, node: &Node, place: &Place) -> f32 {
-        let inner = self.inner.occlusion(node, place);
-        let hidden = self.occlusion.probability(place.to_world(node.center));
-        1.0 - blend(1.0 - inner, 0.0, hidden)
-    }
-
-    fn epoch(&mut self, eye: Vec3) -> u64 {
-        self.occlusion.look_from(eye);
-        let inner = self.inner.epoch(eye);
-        inner.wrapping_mul(0x1_0000_0001) ^ u64::from(self.occlusion.stamp())
     }
 }
 
@@ -410,17 +374,5 @@ mod tests {
             occlusion.look_from(eye);
             assert!((0.0..=1.0).contains(&occlusion.probability(Vec3::ONE)));
         }
-    }
-
-    #[test]
-    fn equation_5_blends_towards_the_lowest() {
-        assert_eq!(
-            (
-                blend(8.0, 2.0, 0.0),
-                blend(8.0, 2.0, 0.5),
-                blend(8.0, 2.0, 1.0)
-            ),
-            (8.0, 5.0, 2.0)
-        );
     }
 }

@@ -140,10 +140,10 @@ fn rows(
     let shown = looked_at(path.len(), settings.pictures);
     let strength = settings.strength;
     let density = Density { strength };
-    let hidden = Hidden {
-        inner: density,
-        occlusion: Occlusion::new(cells, Law::Beer).clumped(settings.clumping),
-    };
+    let hidden = Hidden::new(
+        density,
+        Occlusion::new(cells, Law::Beer).clumped(settings.clumping),
+    );
     let walks: [Walk; 4] = [
         stand.walk(Plain, path, &shown),
         stand.walk(DotProduct { strength }, path, &shown),

@@ -29,10 +29,7 @@ struct Part<'g> {
 
 impl<'g> Part<'g> {
     fn new(species: &[Hierarchy], places: &[Place], occlusion: Occlusion<'g>) -> Self {
-        let hidden = Hidden {
-            inner: Density::default(),
-            occlusion,
-        };
+        let hidden = Hidden::new(Density::default(), occlusion);
         Self {
             forest: Forest::new(species.to_vec(), places, hidden),
             drawn: Vec::new(),
