@@ -7,6 +7,7 @@ use glam::Vec3;
 use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, utf8_percent_encode};
 use serde_json::{Map, Value, json};
 
+use super::joined::joined;
 use super::surface::{Scene, Surface, textures_of};
 use super::tangent::tangents;
 use crate::botany::model::{AlphaMode, Frame, Material, TextureRef, Wrap};
@@ -114,8 +115,8 @@ impl FileBuilder {
         numbers
     }
 
-    /// Adds surfaces as one mesh and returns its index; `numbers` are those of their materials in
-    /// the file ([`FileBuilder::materials`]).
+    /// Adds surfaces as one mesh and returns its index, those of one material as one primitive; `numbers` are those of
+    /// their materials in the file ([`FileBuilder::materials`]).
     pub fn mesh_of(
         &mut self,
         name: &str,
@@ -124,7 +125,7 @@ impl FileBuilder {
         numbers: &[usize],
     ) -> Result<usize> {
         let mut primitives = Vec::new();
-        for surface in surfaces.iter().filter(|s| !s.triangles.is_empty()) {
+        for surface in &joined(surfaces, numbers) {
             let uses = uv_sets(&materials[surface.material as usize]);
             let mut attributes = Map::new();
             attributes.insert(

@@ -12,6 +12,7 @@ pub mod foliage;
 pub mod gltf;
 pub mod hierarchy;
 pub mod instanced;
+mod joined;
 mod leftovers;
 pub mod level_scene;
 pub mod manifest;
