@@ -32,6 +32,40 @@ impl State {
     }
 }
 
+/// What one try to read a file gave.
+struct Reading {
+    /// When it was opened.
+    opened: SystemTime,
+    before: State,
+    bytes: Vec<u8>,
+    after: State,
+}
+
+impl Reading {
+    fn of(path: &Path) -> Result<Self> {
+        let io = |doing| move |source| Error::io(path, doing, source);
+        let mut file = File::open(path).map_err(io("open"))?;
+        let opened = SystemTime::now();
+        let before = State::of(&file.metadata().map_err(io("open"))?);
+        let mut bytes = Vec::with_capacity(usize::try_from(before.0).unwrap_or(0));
+        file.read_to_end(&mut bytes).map_err(io("read"))?;
+        let after = State::of(&file.metadata().map_err(io("read"))?);
+        Ok(Self {
+            opened,
+            before,
+            bytes,
+            after,
+        })
+    }
+
+    /// Whether the bytes are what the file was at one moment.
+    fn is_whole(&self) -> bool {
+        self.before == self.after
+            && self.bytes.len() as u64 == self.after.0
+            && !self.before.is_young(self.opened)
+    }
+}
+
 /// The bytes of a file as they were at one moment.
 ///
 /// A file that is written in place gives the beginning of one version and the end of another, which may well be a
@@ -40,16 +74,10 @@ impl State {
 /// # Errors
 /// Says what failed, or that the file is still being written.
 pub(super) fn read_settled(path: &Path) -> Result<Vec<u8>> {
-    let io = |doing| move |source| Error::io(path, doing, source);
     for _ in 0..ATTEMPTS {
-        let mut file = File::open(path).map_err(io("open"))?;
-        let opened = SystemTime::now();
-        let before = State::of(&file.metadata().map_err(io("open"))?);
-        let mut bytes = Vec::with_capacity(usize::try_from(before.0).unwrap_or(0));
-        file.read_to_end(&mut bytes).map_err(io("read"))?;
-        let after = State::of(&file.metadata().map_err(io("read"))?);
-        if before == after && bytes.len() as u64 == after.0 && !before.is_young(opened) {
-            return Ok(bytes);
+        let reading = Reading::of(path)?;
+        if reading.is_whole() {
+            return Ok(reading.bytes);
         }
         std::thread::sleep(TICK);
     }
@@ -78,6 +106,32 @@ mod tests {
             "another clock"
         );
         assert!(!State(5, None).is_young(written), "no clock at all");
+    }
+
+    #[test]
+    fn what_changed_while_it_was_read_is_no_version_of_it() {
+        let written = SystemTime::UNIX_EPOCH + Duration::from_secs(9);
+        let later = Some(written + Duration::from_secs(5));
+        let old = State(4, Some(written));
+        let whole = |before, bytes: &[u8], after, opened| {
+            let bytes = bytes.to_vec();
+            let reading = Reading {
+                opened,
+                before,
+                bytes,
+                after,
+            };
+            reading.is_whole()
+        };
+        let opened = written + Duration::from_secs(5);
+        assert!(whole(old, b"text", old, opened));
+        assert!(!whole(old, b"text", State(4, later), opened), "rewritten");
+        assert!(
+            !whole(old, b"text", State(7, Some(written)), opened),
+            "longer"
+        );
+        assert!(!whole(old, b"tex", old, opened), "cut off and whole again");
+        assert!(!whole(old, b"text", old, written), "within one tick");
     }
 
     #[test]
