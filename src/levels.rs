@@ -6,7 +6,7 @@ use crate::detail::element::Element;
 use crate::detail::optimal_distance::TEXELS;
 use crate::export::combined::{Packed, extras};
 use crate::export::manifest::{self, FORMAT, Manifest, Range, VERSION};
-use crate::export::surface::{Scene, scene_of_model};
+use crate::export::surface::{Scene, materials_of_model, scene_of_model};
 use crate::ladder::{Rung, WHOLE_TREE_TRIANGLES};
 use crate::level::{Baker, Level};
 use crate::request::Request;
@@ -50,20 +50,18 @@ impl<'a> Levels<'a> {
             packed: Vec::with_capacity(ranges.len()),
             manifest,
         };
-        let mut all = original(tree);
-        let triangles = all.triangles();
-        // It is as large as the tree and waits for the last level: `add_original` makes it again.
-        all.surfaces.clear();
+        // Its surfaces are as large as the tree and wait for the last level: `add_original` makes them.
+        let materials = materials_of_model(&tree.model);
         let level = manifest::Level {
             file: match out.shows_original() {
                 true => out.name(0) + ".glb",
                 false => String::new(),
             },
-            triangles,
+            triangles: tree.model.triangles.len() as u64,
             range: ranges[0],
             ..manifest::Level::default()
         };
-        out.push(all, level);
+        out.push(materials, level);
         out
     }
 
@@ -71,7 +69,9 @@ impl<'a> Levels<'a> {
     pub fn add_original(&mut self) {
         let level = &mut self.packed[0];
         if level.shown {
-            level.scene.surfaces = original(self.tree).surfaces;
+            let model = &self.tree.model;
+            let all = scene_of_model(model, 0..model.triangles.len() as u32);
+            level.scene.surfaces = all.surfaces;
         }
     }
 
@@ -117,11 +117,6 @@ impl<'a> Levels<'a> {
     fn name(&self, level: usize) -> String {
         format!("{}_LOD{level}", self.tree.model.name)
     }
-}
-
-/// All of a tree as its file has it.
-fn original(tree: &Tree) -> Scene {
-    scene_of_model(&tree.model, 0..tree.model.triangles.len() as u32)
 }
 
 /// The rung with as many triangles as the request's error needs, if it bounds it.

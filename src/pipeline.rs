@@ -64,7 +64,7 @@ fn made(request: &Request, watch: &dyn Watch) -> Result<Baked> {
         ranges,
     } = Prepared::new(request, watch)?;
     let Made {
-        packed,
+        mut packed,
         manifest: levels,
         shares,
         candidates,
@@ -92,6 +92,7 @@ fn made(request: &Request, watch: &dyn Watch) -> Result<Baked> {
         true => Some(Visibility::of(&measure_subtrees(&tree, watch)?)),
         false => None,
     };
+    packed.iter_mut().for_each(Packed::forget);
     let judged = read_back(&package, &packed[1..], &rungs)?;
     begin(watch, "measure", heights(&judged).len() as u64)?;
     let measured = (&tree.model, original_file(&levels, &provenance));

@@ -12,7 +12,7 @@ use crate::export::combined::{Packed, write_combined};
 use crate::export::gltf::write_glb;
 use crate::export::manifest::SUFFIX;
 use crate::export::package::Package;
-use crate::export::png::encode_images;
+use crate::export::png::encode_png;
 use crate::export::shipped::{Role, roles, to_dds};
 use crate::report::schema::SharedLevel;
 use crate::scene::{Mips, Scene, TextureFormat};
@@ -26,10 +26,13 @@ pub fn encode_images_of(level: &mut Packed) -> Result<()> {
     if !level.shown {
         return Ok(());
     }
-    level.pngs = encode_images(&level.scene)?;
-    for image in &mut level.scene.images {
+    let encode = |image: &mut Image| {
+        let png = encode_png(image);
         image.rgba = Arc::default();
-    }
+        png
+    };
+    let images = level.scene.images.par_iter_mut();
+    level.pngs = images.map(encode).collect::<Result<_>>()?;
     Ok(())
 }
 

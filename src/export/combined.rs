@@ -30,10 +30,18 @@ pub struct Packed {
     pub shown: bool,
 }
 
+impl Packed {
+    /// Drops what is written by now: only where and how it is shown stays.
+    pub fn forget(&mut self) {
+        self.scene = Scene::default();
+        self.pngs = Vec::new();
+    }
+}
+
 /// Writes all levels that are shown, nearest first, into one GLB.
 pub fn write_combined(levels: &[Packed], frame: &Frame) -> Result<Vec<u8>> {
-    let mut file = FileBuilder::default();
     let levels: Vec<&Packed> = levels.iter().filter(|l| l.shown).collect();
+    let mut file = FileBuilder::for_scenes(levels.iter().map(|l| (&l.scene, &l.pngs[..])));
     let meshes = levels
         .iter()
         .map(|l| file.mesh(&l.name, &l.scene, &l.pngs))

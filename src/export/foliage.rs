@@ -3,15 +3,14 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use glam::{Vec2, Vec3};
+use glam::Vec2;
 use rayon::prelude::*;
 
 use super::atlas::{Layout, lay_out};
 use super::chart::{Chart, Shape};
-use super::edge::bleed;
 use super::project::project;
 use super::surface::Surface;
-use super::texel::Stored;
+use super::texel::{Stored, Texels};
 use crate::botany::model::{AlphaMode, Image, Material, Model, TextureRef, Wrap};
 use crate::cloud::card::Card;
 
@@ -44,7 +43,7 @@ pub struct Foliage {
     /// Size of the page in texels.
     pub size: [u32; 2],
     /// The page, row by row; colours and normals are already bled into empty texels.
-    pub texels: Vec<Stored>,
+    pub texels: Texels,
     /// Whether the texel belongs to a chart.
     pub owned: Vec<bool>,
     /// Whether cards are seen from their front alone.
@@ -71,15 +70,15 @@ impl Foliage {
 
     /// An empty page for `charts`.
     pub(super) fn of(charts: Vec<Chart>, size: [u32; 2]) -> Self {
-        let texels = vec![Stored::default(); (size[0] * size[1]) as usize];
+        let count = (size[0] * size[1]) as usize;
         Self {
-            owned: vec![false; texels.len()],
-            alpha: vec![0; texels.len()],
+            owned: vec![false; count],
+            alpha: vec![0; count],
             charts,
             backs: Vec::new(),
             one_sided: false,
             size,
-            texels,
+            texels: Texels::empty(count),
         }
     }
 
@@ -105,7 +104,7 @@ impl Foliage {
                 .collect();
             for (chart, texels) in projected {
                 for (local, at) in placed_texels(chart, width) {
-                    self.texels[at] = texels[local];
+                    self.texels.set(at, texels[local]);
                     self.owned[at] = true;
                 }
             }
@@ -131,7 +130,7 @@ impl Foliage {
             .collect();
         for (back, projection) in backs.iter().zip(drawn) {
             for (local, at) in placed_texels(back, self.size[0]) {
-                self.texels[at] = projection.texels[local].into();
+                self.texels.set(at, projection.texels[local].into());
             }
         }
         self.backs = sided.iter().copied().zip(backs).collect();
@@ -143,7 +142,7 @@ impl Foliage {
             charts: self.charts.clone(),
             backs: self.backs.clone(),
             size: self.size,
-            texels: Vec::new(),
+            texels: Texels::default(),
             owned: self.owned.clone(),
             one_sided: self.one_sided,
             alpha: self.alpha.clone(),
@@ -181,22 +180,13 @@ impl Foliage {
 
     /// Alpha 255 where the coverage reaches `t`, else `floor`.
     pub fn threshold(&mut self, t: f32, floor: u8) {
-        self.alpha = self
-            .texels
-            .par_iter()
-            .map(|x| if x.coverage() >= t { 255 } else { floor })
-            .collect();
+        let alpha = |coverage: f32| if coverage >= t { 255 } else { floor };
+        self.alpha = self.texels.coverages().map(alpha).collect();
     }
 
     /// Bleeds colours into empty texels; call once, after the last use of `coverage` as it is.
     pub fn bleed(&mut self) {
-        let mut fill = |get: fn(&Stored) -> Vec3, set: fn(&mut Stored, Vec3)| {
-            let weighted = |texel: &Stored| (get(texel), texel.coverage());
-            bleed(&mut self.texels, self.size, weighted, set);
-        };
-        fill(Stored::color, Stored::set_color);
-        fill(Stored::normal, Stored::set_normal);
-        fill(Stored::orm, Stored::set_orm);
+        self.texels.bleed(self.size);
     }
 
     /// Some of the cards as a mesh with normals, tangents and atlas coordinates.
@@ -223,37 +213,23 @@ impl Foliage {
     }
 
     /// Base colour with alpha; where light is to fall on it, tangent-space normals and
-    /// occlusion-roughness-metalness, too.
-    pub fn images(&self, lit: bool) -> Vec<Image> {
-        type Pixel = fn(&Stored, u8) -> [u8; 4];
-        let page = |(name, pixel): (&&str, Pixel)| {
-            let texels = self.texels.par_iter().zip(&self.alpha);
-            let pixels: Vec<[u8; 4]> = texels.map(|(t, &a)| pixel(t, a)).collect();
+    /// occlusion-roughness-metalness, too. They are what the texels were: these are no more.
+    pub fn take_images(&mut self, lit: bool) -> Vec<Image> {
+        let mut texels = std::mem::take(&mut self.texels);
+        let page = |(number, name): (usize, &&str)| {
+            let rgba = match number {
+                0 => texels.take_colors(&std::mem::take(&mut self.alpha)),
+                1 => texels.take_normals(),
+                _ => texels.take_orms(),
+            };
             Image {
                 name: (*name).into(),
                 width: self.size[0],
                 height: self.size[1],
-                rgba: Arc::new(pixels.into_flattened()),
+                rgba: Arc::new(rgba),
             }
         };
-        fn byte(v: f32) -> u8 {
-            (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8
-        }
-        let pixels: [Pixel; 3] = [
-            |t, a| {
-                let [r, g, b] = t.srgb();
-                [r, g, b, a]
-            },
-            |t, _| {
-                let n = t.normal().normalize_or(Vec3::Z) * 0.5 + 0.5;
-                [byte(n.x), byte(n.y), byte(n.z), 255]
-            },
-            |t, _| {
-                let [o, r, m] = t.orm().to_array().map(byte);
-                [o, r, m, 255]
-            },
-        ];
-        names(lit).iter().zip(pixels).map(page).collect()
+        names(lit).iter().enumerate().map(page).collect()
     }
 }
 
@@ -266,7 +242,7 @@ fn placed_texels(chart: &Chart, width: u32) -> impl Iterator<Item = (usize, usiz
     })
 }
 
-/// Names of the images of [`Foliage::images`].
+/// Names of the images of [`Foliage::take_images`].
 const IMAGES: [&str; 3] = ["foliage_base_color", "foliage_normal", "foliage_orm"];
 
 /// Those of them that a page has.

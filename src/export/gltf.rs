@@ -23,7 +23,7 @@ pub fn write_glb(
     frame: &Frame,
     extras: Value,
 ) -> Result<Vec<u8>> {
-    let mut file = FileBuilder::default();
+    let mut file = FileBuilder::for_scenes([(scene, pngs)].into_iter());
     let mesh = file.mesh(name, scene, pngs)?;
     let node = file.node(name, mesh, frame, extras);
     Ok(file.finish(vec![node]))
@@ -61,7 +61,22 @@ pub struct FileBuilder {
     required: Vec<&'static str>,
 }
 
+/// Room for a file's JSON, bytes: as much as a level with a few materials takes.
+const JSON: usize = 1 << 14;
+
 impl FileBuilder {
+    /// As an empty one, with room for scenes and their images: files of large trees are not copied while they grow.
+    pub fn for_scenes<'s>(scenes: impl Iterator<Item = (&'s Scene, &'s [Vec<u8>])>) -> Self {
+        let bytes = scenes.map(|(scene, pngs)| {
+            let surfaces = scene.surfaces.iter().map(Surface::bytes).sum::<usize>();
+            surfaces + pngs.iter().map(Vec::len).sum::<usize>()
+        });
+        Self {
+            glb: GlbBuilder::with_capacity(bytes.sum::<usize>() + JSON),
+            ..Self::default()
+        }
+    }
+
     /// Adds all surfaces of a scene as one mesh and returns its index; `pngs` are its images.
     /// Images and materials that an earlier mesh has brought are shared.
     pub fn mesh(&mut self, name: &str, scene: &Scene, pngs: &[Vec<u8>]) -> Result<usize> {

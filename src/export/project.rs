@@ -3,6 +3,8 @@
 //! Each texel gets the share of its sub-samples that the group covers (alpha tested as the
 //! original's material says) and the mean of what is seen there, from the front of the card.
 
+use std::ops::Range;
+
 use glam::{Vec2, Vec3};
 
 use super::chart::Chart;
@@ -44,6 +46,10 @@ const NOTHING: Hit = Hit {
     weights: Vec2::ZERO,
 };
 
+/// Sub-samples that are drawn at a time, about: of a large card all together are many times its texels, and these stay in the
+/// nearest caches.
+const AT_ONCE: u32 = 1 << 16;
+
 /// Projects `triangles` on the card of `chart` with `samples` x `samples` sub-samples a texel.
 pub fn project(
     model: &Model,
@@ -52,59 +58,97 @@ pub fn project(
     samples: u32,
 ) -> Projection {
     let [w, h] = chart.size;
-    let (sw, sh) = (w * samples, h * samples);
-    let mut hits = vec![NOTHING; (sw * sh) as usize];
-    for t in triangles {
-        draw(model, t, chart, samples as f32, [sw, sh], &mut hits);
-    }
+    let width = w * samples;
+    let triangles: Vec<Drawn> = triangles
+        .filter_map(|t| Drawn::new(model, t, chart, samples))
+        .collect();
+    let band = (AT_ONCE / (width * samples).max(1)).max(1);
+    let mut hits = Vec::new();
     let mut texels = Vec::with_capacity((w * h) as usize);
-    for y in 0..h {
-        for x in 0..w {
-            let rows = (y * samples..(y + 1) * samples).map(|r| {
-                let from = (r * sw + x * samples) as usize;
-                &hits[from..from + samples as usize]
-            });
-            texels.push(resolve(model, chart, rows.flatten(), samples * samples));
+    for first in (0..h).step_by(band as usize) {
+        let texel_rows = first..(first + band).min(h);
+        let rows = texel_rows.start * samples..texel_rows.end * samples;
+        hits.clear();
+        hits.resize((width * (rows.end - rows.start)) as usize, NOTHING);
+        for triangle in &triangles {
+            triangle.draw(model, width, rows.clone(), &mut hits);
+        }
+        for y in 0..texel_rows.end - texel_rows.start {
+            for x in 0..w {
+                let rows = (y * samples..(y + 1) * samples).map(|r| {
+                    let from = (r * width + x * samples) as usize;
+                    &hits[from..from + samples as usize]
+                });
+                texels.push(resolve(model, chart, rows.flatten(), samples * samples));
+            }
         }
     }
     Projection { texels }
 }
 
-fn draw(model: &Model, t: u32, chart: &Chart, samples: f32, [sw, sh]: [u32; 2], hits: &mut [Hit]) {
-    let corners = model.corners(t);
-    let p = corners.map(|c| chart.texel(c) * samples);
-    let behind = behind(model, t, corners, chart);
-    let depth = corners.map(|c| (c - chart.origin).dot(chart.normal) - behind);
-    let (side, other) = (p[1] - p[0], p[2] - p[0]);
-    let double_area = side.perp_dot(other);
-    if double_area.abs() < 1e-12 {
-        return;
+/// A triangle on the card's grid of sub-samples.
+struct Drawn {
+    triangle: u32,
+    /// Its corners there.
+    corners: [Vec2; 3],
+    /// Their depths along the card's normal.
+    depths: [f32; 3],
+    /// Its rows that lie at or below the card's first.
+    rows: Range<u32>,
+}
+
+impl Drawn {
+    /// `None`: seen edge-on.
+    fn new(model: &Model, t: u32, chart: &Chart, samples: u32) -> Option<Self> {
+        let corners = model.corners(t);
+        let p = corners.map(|c| chart.texel(c) * samples as f32);
+        if (p[1] - p[0]).perp_dot(p[2] - p[0]).abs() < 1e-12 {
+            return None;
+        }
+        let behind = behind(model, t, corners, chart);
+        let (low, high) = (p[0].min(p[1]).min(p[2]), p[0].max(p[1]).max(p[2]));
+        Some(Self {
+            triangle: t,
+            corners: p,
+            depths: corners.map(|c| (c - chart.origin).dot(chart.normal) - behind),
+            rows: low.y.max(0.0) as u32..high.y.ceil().max(0.0) as u32,
+        })
     }
-    let alpha = AlphaTest::of(model, t);
-    // Barycentric weights of corners 1 and 2: what they gain from a sample to the next.
-    let right = Vec2::new(other.y, -side.y) / double_area;
-    let down = Vec2::new(-other.x, side.x) / double_area;
-    let low = p[0].min(p[1]).min(p[2]).max(Vec2::ZERO);
-    let high = p[0].max(p[1]).max(p[2]);
-    let x_end = (high.x.ceil().max(0.0) as u32).min(sw);
-    let y_end = (high.y.ceil().max(0.0) as u32).min(sh);
-    for y in low.y as u32..y_end {
-        let first = Vec2::new(0.5 - p[0].x, y as f32 + 0.5 - p[0].y);
-        let row = right * first.x + down * first.y;
-        let [from, to] = inside(row, right, [low.x as u32, x_end]);
-        for x in from..to {
-            let weights = row + right * x as f32;
-            if weights.min_element() < 0.0 || weights.element_sum() > 1.0 {
-                continue;
-            }
-            let d = depth[0] + weights.dot(Vec2::new(depth[1] - depth[0], depth[2] - depth[0]));
-            let hit = &mut hits[(y * sw + x) as usize];
-            if d > hit.depth && alpha.passes(weights) {
-                *hit = Hit {
-                    depth: d,
-                    triangle: t,
-                    weights,
-                };
+
+    /// Draws those of its rows that are asked for, each of which has `width` sub-samples.
+    fn draw(&self, model: &Model, width: u32, rows: Range<u32>, hits: &mut [Hit]) {
+        let asked = self.rows.start.max(rows.start)..self.rows.end.min(rows.end);
+        if asked.is_empty() {
+            return;
+        }
+        let [p, q, r] = self.corners;
+        let (side, other) = (q - p, r - p);
+        let double_area = side.perp_dot(other);
+        let alpha = AlphaTest::of(model, self.triangle);
+        // Barycentric weights of corners 1 and 2: what they gain from a sample to the next.
+        let right = Vec2::new(other.y, -side.y) / double_area;
+        let down = Vec2::new(-other.x, side.x) / double_area;
+        let low = p.min(q).min(r).max(Vec2::ZERO).x as u32;
+        let high = (p.max(q).max(r).x.ceil().max(0.0) as u32).min(width);
+        let [a, b, c] = self.depths;
+        for y in asked {
+            let first = Vec2::new(0.5 - p.x, y as f32 + 0.5 - p.y);
+            let row = right * first.x + down * first.y;
+            let [from, to] = inside(row, right, [low, high]);
+            for x in from..to {
+                let weights = row + right * x as f32;
+                if weights.min_element() < 0.0 || weights.element_sum() > 1.0 {
+                    continue;
+                }
+                let depth = a + weights.dot(Vec2::new(b - a, c - a));
+                let hit = &mut hits[((y - rows.start) * width + x) as usize];
+                if depth > hit.depth && alpha.passes(weights) {
+                    *hit = Hit {
+                        depth,
+                        triangle: self.triangle,
+                        weights,
+                    };
+                }
             }
         }
     }

@@ -55,7 +55,7 @@ const BATCH: usize = 512;
 /// For each texel of the page, the projected coverage corrected by the views' votes.
 pub fn refine(foliage: &Foliage, targets: &[&Target], options: Refine) -> Vec<f32> {
     let mut mean = vec![0.0f32; foliage.texels.len()];
-    let score = |at: usize, mean: f32| foliage.texels[at].coverage() + options.weight * mean;
+    let score = |at: usize, mean: f32| foliage.texels.coverage(at) + options.weight * mean;
     let rows: Vec<Vec<u32>> = foliage.charts.iter().map(Chart::row_lengths).collect();
     // Windows show texels of others, and the rows of outlines' boxes hold some.
     let several = |c: &Chart| matches!(c.shape, Shape::Window | Shape::Mask(_));

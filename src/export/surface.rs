@@ -30,6 +30,20 @@ pub struct Surface {
     pub material: u32,
 }
 
+impl Surface {
+    /// Bytes that it takes in a file, at most.
+    pub fn bytes(&self) -> usize {
+        let [first, second] = &self.uvs;
+        size_of_val(&self.positions[..])
+            + size_of_val(&self.normals[..])
+            + size_of_val(&self.tangents[..])
+            + size_of_val(&first[..])
+            + size_of_val(&second[..])
+            + size_of_val(&self.colors[..])
+            + size_of_val(&self.triangles[..])
+    }
+}
+
 /// All that one file shows.
 #[derive(Clone, Debug, Default)]
 pub struct Scene {
@@ -63,6 +77,19 @@ pub fn scene_of_model(model: &Model, triangles: impl Iterator<Item = u32>) -> Sc
     let mut assembly = Assembly::new(model, model.positions.len());
     assembly.triangles(triangles);
     assembly.finish()
+}
+
+/// What [`scene_of_model`] gives for all triangles, without its surfaces: materials and images.
+pub fn materials_of_model(model: &Model) -> Scene {
+    let mut seen = vec![false; model.materials.len()];
+    let first_of_material = |&t: &u32| {
+        let object = &model.objects[model.triangle_object[t as usize] as usize];
+        !std::mem::replace(&mut seen[object.material as usize], true)
+    };
+    let all = 0..model.triangles.len() as u32;
+    let mut scene = scene_of_model(model, all.filter(first_of_material));
+    scene.surfaces.clear();
+    scene
 }
 
 /// As [`scene_of_model`], for several groups of triangles: which surfaces each has become.
@@ -250,6 +277,17 @@ mod tests {
     }
 
     #[test]
+    fn materials_alone_are_those_of_all_surfaces() {
+        let mut model = two_materials();
+        model.triangles.extend([[0, 3, 1], [2, 1, 3]]);
+        model.triangle_object.extend([1, 0]);
+        let (all, alone) = (scene_of_model(&model, 0..4), materials_of_model(&model));
+        assert_eq!(alone.materials, all.materials);
+        assert_eq!(alone.images, all.images);
+        assert_eq!((alone.surfaces.len(), alone.materials.len()), (0, 2));
+    }
+
+    #[test]
     fn surfaces_have_their_own_vertices_and_images() {
         let model = two_materials();
         let scene = scene_of_model(&model, 0..2);
@@ -257,6 +295,7 @@ mod tests {
         for (surface, t) in scene.surfaces.iter().zip([1, 0]) {
             assert_eq!(surface.triangles, [[0, 1, 2]]);
             assert_eq!(surface.positions, model.corners(t));
+            assert_eq!(surface.bytes(), 3 * (12 + 12 + 8) + 12);
             let material = &scene.materials[surface.material as usize];
             let image = material.base_color.map(|b| b.image).unwrap_or(u32::MAX);
             let name = &scene.images[image as usize].name;

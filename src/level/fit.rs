@@ -253,7 +253,7 @@ impl Fitted {
         let surface = self.foliage.surface(0..self.foliage.charts.len());
         let material = |first: u32| foliage::material(first, lit, !self.plan.one_sided);
         Level {
-            scene: on_page(self.wood, surface, self.foliage.images(lit), material),
+            scene: on_page(self.wood, surface, self.foliage.take_images(lit), material),
             request: self.request,
             plan: self.plan,
             matched: self.matched,

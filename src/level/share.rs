@@ -242,7 +242,7 @@ impl Page {
     pub fn levels(mut self, guests: &[Guest]) -> Vec<Level> {
         self.shared.foliage.bleed();
         let lit = guests.iter().any(|guest| guest.baker.is_lit());
-        let mut images = self.shared.foliage.images(lit);
+        let mut images = self.shared.foliage.take_images(lit);
         let halvings = guests
             .iter()
             .map(|g| g.baker.recipe.shared_light_halvings());

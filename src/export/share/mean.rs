@@ -31,15 +31,16 @@ pub(super) fn add_copies(foliage: &mut Foliage, trees: &[Cards]) {
         // One after the other: those of one texel are added in the order of their cards.
         for (at, texel) in drawn.into_iter().flatten() {
             if numbers[at] == 0 {
-                sums.push(Sum::new(&foliage.texels[at]));
+                sums.push(Sum::new(&foliage.texels.at(at)));
                 numbers[at] = sums.len() as u32;
             }
             sums[numbers[at] as usize - 1].add(&texel);
         }
     }
-    for (texel, &number) in foliage.texels.iter_mut().zip(&numbers) {
+    for (at, &number) in numbers.iter().enumerate() {
         if let Some(sum) = (number as usize).checked_sub(1).map(|i| &sums[i]) {
-            sum.put(texel);
+            let mean = sum.mean(&foliage.texels.at(at));
+            foliage.texels.set(at, mean.into());
         }
     }
 }
@@ -73,14 +74,18 @@ impl Sum {
         self.cards += 1;
     }
 
-    fn put(&self, stored: &mut Stored) {
-        if self.mass > 0.0 {
-            let [color, normal, orm] = self.values.map(|sum| sum / self.mass);
-            stored.set_color(color);
-            stored.set_normal(normal);
-            stored.set_orm(orm);
+    /// The mean of all cards; what none covers looks as its own card does.
+    fn mean(&self, own: &Stored) -> Texel {
+        let [color, normal, orm] = match self.mass > 0.0 {
+            true => self.values.map(|sum| sum / self.mass),
+            false => [own.color(), own.normal(), own.orm()],
+        };
+        Texel {
+            coverage: self.mass / self.cards as f32,
+            color,
+            normal,
+            orm,
         }
-        stored.set_coverage(self.mass / self.cards as f32);
     }
 }
 

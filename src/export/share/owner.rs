@@ -7,9 +7,13 @@ use crate::space::hull;
 
 /// For each card that shows texels of others, the card that has most of them.
 pub fn owners(charts: &[Chart], size: [u32; 2]) -> Vec<Option<u32>> {
-    let mut owner: Vec<Option<u32>> = vec![None; (size[0] * size[1]) as usize];
-    for (i, chart) in (0..).zip(charts) {
-        each_owned(chart, |x, y| owner[(y * size[0] + x) as usize] = Some(i));
+    if charts.iter().all(|chart| chart.shape != Shape::Window) {
+        return vec![None; charts.len()];
+    }
+    // The owner of each texel of the page, by its number from 1; 0: nobody.
+    let mut owner = vec![0u32; (size[0] * size[1]) as usize];
+    for (number, chart) in (1..).zip(charts) {
+        each_owned(chart, |x, y| owner[(y * size[0] + x) as usize] = number);
     }
     let of_copy = |chart: &Chart| {
         let outline: Vec<Vec2> = chart.corners.iter().map(|&c| chart.texel(c)).collect();
@@ -24,7 +28,7 @@ pub fn owners(charts: &[Chart], size: [u32; 2]) -> Vec<Option<u32>> {
         let mut seen: Vec<u32> = inside
             .filter_map(|i| {
                 let [x, y] = chart.in_atlas(i % w, i / w);
-                owner[(y * size[0] + x) as usize]
+                owner[(y * size[0] + x) as usize].checked_sub(1)
             })
             .collect();
         seen.sort_unstable();
