@@ -18,7 +18,7 @@ use crate::measured_visibility::measure_subtrees;
 use crate::prepared::{Pieces, Prepared};
 pub use crate::provenance::provenance;
 use crate::report::schema::Report;
-use crate::report::{Cuts, Judged, Recognised, Settings, heights, judge};
+use crate::report::{Cuts, Judged, Recognised, Settings, as_written, heights, judge};
 pub use crate::request::Request;
 use crate::scene::{Mips, Scene};
 use crate::sharing;
@@ -78,6 +78,7 @@ fn made(request: &Request, watch: &dyn Watch) -> Result<Baked> {
         }
         _ => None,
     };
+    packed.iter_mut().for_each(Packed::forget);
     let tiles = match request.recipe.hierarchy {
         true => Some(hierarchy(
             &package,
@@ -92,11 +93,11 @@ fn made(request: &Request, watch: &dyn Watch) -> Result<Baked> {
         true => Some(Visibility::of(&measure_subtrees(&tree, watch)?)),
         false => None,
     };
-    packed.iter_mut().for_each(Packed::forget);
     let judged = read_back(&package, &packed[1..], &rungs)?;
     begin(watch, "measure", heights(&judged).len() as u64)?;
     let measured = (&tree.model, original_file(&levels, &provenance));
-    let report = judge(measured, &judged, &settings(&request.scene), || step(watch))?;
+    let mut report = judge(measured, &judged, &settings(&request.scene), || step(watch))?;
+    tell_written(&mut report, &package, &packed[0]);
     let sharing = sharing::told(&report, shares);
     let mut warnings = levels.tree.warnings.clone();
     warnings.extend(not_done_by(&request.scene, request.recipe.instancing));
@@ -146,6 +147,13 @@ fn made(request: &Request, watch: &dyn Watch) -> Result<Baked> {
 pub fn original_file<'a>(made: &'a Manifest, from: &'a Provenance) -> &'a str {
     let level = made.levels.first().map(|level| level.file.as_str());
     level.filter(|file| !file.is_empty()).unwrap_or(&from.input)
+}
+
+/// Lets a report tell what level 0 costs as it was written, if it was.
+pub fn tell_written(report: &mut Report, package: &Package, level: &Packed) {
+    if let Some(row) = report.original.as_mut().filter(|_| level.shown) {
+        as_written(row, &package.file(&format!("{}.glb", level.name)));
+    }
 }
 
 /// The best cuts of a tree, and the levels that were made of some.

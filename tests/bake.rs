@@ -12,6 +12,11 @@ use serde_json::{Value, json};
 
 /// A trunk of eight sides and a crown of `leaves` quads, as other tools write it.
 fn small_tree(file: &Path, leaves: u32) {
+    tree_in_parts(file, leaves, 1);
+}
+
+/// As [`small_tree`], the crown in so many primitives of one material.
+fn tree_in_parts(file: &Path, leaves: u32, parts: usize) {
     let mut glb = GlbBuilder::default();
     let (mut wood, mut wood_triangles) = (Vec::new(), Vec::new());
     for ring in 0..6u32 {
@@ -56,10 +61,10 @@ fn small_tree(file: &Path, leaves: u32) {
         let indices = glb.indices(triangles, points.len());
         json!({ "attributes": { "POSITION": position }, "indices": indices, "material": material })
     };
-    let primitives = [
-        primitive(&wood, &wood_triangles, 0),
-        primitive(&crown, &crown_triangles, 1),
-    ];
+    let mut primitives = vec![primitive(&wood, &wood_triangles, 0)];
+    let of_part = 2 * (leaves as usize).div_ceil(parts);
+    let crowns = crown_triangles.chunks(of_part);
+    primitives.extend(crowns.map(|part| primitive(&crown, part, 1)));
     let color = |name: &str, rgb: [f32; 3], sided: bool| {
         let [r, g, b] = rgb;
         json!({ "name": name, "doubleSided": sided, "pbrMetallicRoughness": { "baseColorFactor": [r, g, b, 1.0] } })
@@ -123,6 +128,23 @@ impl Place {
         }
         code
     }
+}
+
+#[test]
+fn the_report_tells_what_level_0_costs_as_it_is_written() {
+    let place = Place::new();
+    tree_in_parts(&place.path("tree.glb"), 300, 4);
+    assert_eq!(place.code("out", &[]), 0);
+    let report = std::fs::read(place.path("out/report.json")).unwrap();
+    let original = serde_json::from_slice::<Report>(&report).unwrap().original;
+    let original = original.unwrap();
+    let file = place.path("out").join(&original.file);
+    let bytes = std::fs::metadata(&file).unwrap().len();
+    assert_eq!(original.file_bytes, bytes);
+    let written = gltf::Gltf::open(file).unwrap();
+    let calls: usize = written.meshes().map(|m| m.primitives().count()).sum();
+    // Of five in the source.
+    assert_eq!((original.draw_calls, calls), (2, 2));
 }
 
 fn names(folder: &Path) -> Vec<String> {

@@ -1,7 +1,10 @@
 //! What a model costs an engine.
 
 use std::collections::BTreeSet;
+use std::path::Path;
 
+use super::schema::Level;
+use super::start::json;
 use crate::botany::Model;
 use crate::botany::model::TextureRef;
 
@@ -11,6 +14,20 @@ pub fn draw_calls(model: &Model) -> u64 {
     let drawn: BTreeSet<u32> = model.triangle_object.iter().copied().collect();
     let first = |&&object: &&u32| model.objects[object as usize].instance == 0;
     drawn.iter().filter(first).count() as u64
+}
+
+/// Sets what a level's file tells of its costs: its bytes and its draw calls, which may be fewer than those of the model that
+/// was written to it.
+pub fn as_written(level: &mut Level, file: &Path) {
+    if let Ok(about) = file.metadata() {
+        level.file_bytes = about.len();
+    }
+    if let Some(root) = json(file) {
+        let nodes = root["nodes"].as_array().into_iter().flatten();
+        let meshes = nodes.filter_map(|node| root["meshes"].get(node["mesh"].as_u64()? as usize));
+        let primitives = meshes.filter_map(|mesh| mesh["primitives"].as_array());
+        level.draw_calls = primitives.map(|list| list.len() as u64).sum();
+    }
 }
 
 /// Bytes on the GPU of all textures in use, uncompressed RGBA with all mips.

@@ -26,7 +26,7 @@ mod stand;
 mod start;
 
 pub use contact::contact_sheet;
-pub use cost::{draw_calls, texture_bytes};
+pub use cost::{as_written, draw_calls, texture_bytes};
 pub use cuts::Cuts;
 pub use drawable::Drawable;
 pub use evaluate::{Settings, evaluate, evaluate_watched};

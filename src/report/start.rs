@@ -54,7 +54,7 @@ impl Start {
 }
 
 /// The JSON of a GLB.
-fn json(file: &Path) -> Option<Value> {
+pub(super) fn json(file: &Path) -> Option<Value> {
     let mut file = File::open(file).ok()?;
     let mut head = [0; 20];
     file.read_exact(&mut head).ok()?;

@@ -17,7 +17,9 @@ use crate::export::package::{Package, remove_beside};
 use crate::knobs::check;
 use crate::level::{Baker, Level, LevelRequest};
 use crate::levels::{Levels, needed};
-use crate::pipeline::{cuts, not_done_by, original_file, pixels, read_back, settings};
+use crate::pipeline::{
+    cuts, not_done_by, original_file, pixels, read_back, settings, tell_written,
+};
 use crate::prepared::{Pieces, Prepared};
 use crate::recipe::Recipe;
 use crate::report::band::Fault;
@@ -176,6 +178,7 @@ fn measure(
     );
     let screen = settings(&levels.manifest.scene);
     let mut report = judge(original, &judged, &screen, || part(watch, "view"))?;
+    tell_written(&mut report, package, &levels.packed[0]);
     report.cuts = Some(cuts);
     let mut faults = in_band(&t.tree, &t.rungs, &judged, &report);
     for fault in &mut faults {
