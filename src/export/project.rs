@@ -367,3 +367,28 @@ fn card_normal(model: &Model, chart: &Chart, t: u32, b: f32, c: f32) -> Vec3 {
     )
     .normalize()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::export::sides::tests::leaf;
+
+    #[test]
+    fn a_card_that_is_drawn_some_rows_at_a_time_has_no_seams() {
+        let (model, group) = leaf(false);
+        let chart = Chart::new(&group.card, 300.0, 0.0);
+        let [width, height] = chart.size;
+        assert!(width * height * 16 > 8 * AT_ONCE);
+        let drawn = project(&model, group.triangles.iter().copied(), &chart, 4);
+        let rows = drawn.texels.chunks(width as usize);
+        let rows: Vec<f32> = rows
+            .map(|row| row.iter().map(|texel| texel.coverage).sum())
+            .collect();
+        // A right triangle with legs of 300 texels: each row has one more than the next, or one less.
+        let area: f32 = rows.iter().sum();
+        assert!((area - 45_000.0).abs() < 50.0, "{area}");
+        let steps = rows.windows(2).map(|pair| (pair[1] - pair[0]).abs());
+        let uneven = steps.filter(|step| (step - 1.0).abs() > 0.26).count();
+        assert!(uneven <= 2, "{uneven} of {} rows", rows.len());
+    }
+}
