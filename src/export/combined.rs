@@ -47,7 +47,7 @@ pub fn write_combined(levels: &[Packed], frame: &Frame) -> Result<Vec<u8>> {
         .map(|l| file.mesh(&l.name, &l.scene, &l.pngs))
         .collect::<Result<Vec<usize>>>()?;
     let first = wired(&mut file, &levels, &meshes, frame);
-    Ok(file.finish(vec![first]))
+    file.finish(vec![first])
 }
 
 /// A tree of a species with its levels, nearest first.
@@ -77,7 +77,7 @@ pub fn write_species(trees: &[Stand]) -> Result<Vec<u8>> {
         let first = wired(&mut file, &levels, &meshes, tree.frame);
         scenes.push((tree.name, vec![first]));
     }
-    Ok(file.finish_scenes(&scenes))
+    file.finish_scenes(&scenes)
 }
 
 /// Adds a node for each level; returns the first, which names the others.

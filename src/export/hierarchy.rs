@@ -114,7 +114,7 @@ pub fn write_hierarchy(
     // Where nothing is ever opened there is no geometry, and a scene without nodes is none.
     let mut scenes = vec![("geometry", geometry), ("billboards", billboards)];
     scenes.retain(|(_, nodes)| !nodes.is_empty());
-    Ok(file.finish_scenes(&scenes))
+    file.finish_scenes(&scenes)
 }
 
 /// Adds a node for the billboards of each tile that has some.
@@ -207,7 +207,7 @@ pub fn write_geometry(model: &Model, tips: &Tips, images: &[String]) -> Result<V
         let numbers = file.linked_materials(scene, surfaces, images);
         let mesh = file.mesh_of(&name, surfaces, &scene.materials, &numbers)?;
         let node = file.node(&name, mesh, &model.frame, tile.extras.clone());
-        Ok(file.finish(vec![node]))
+        file.finish(vec![node])
     });
     written.collect()
 }

@@ -68,7 +68,7 @@ pub fn write_instanced(
     }
     let root = json!({ "name": tree.model.name, "children": children });
     let root = file.placed(root, &tree.model.frame, extras);
-    let bytes = file.finish(vec![root]);
+    let bytes = file.finish(vec![root])?;
     let deviations = found.iter().flat_map(|p| &p.copies).map(|c| c.deviation);
     let told = Instancing {
         leaves: tree.leaves.len() as u64,

@@ -28,6 +28,11 @@ impl GlbBuilder {
         }
     }
 
+    /// Bytes of all views so far.
+    pub fn bytes(&self) -> usize {
+        self.binary.len()
+    }
+
     /// Adds bytes as a buffer view, aligned to four bytes, and returns its index.
     pub fn view(&mut self, bytes: &[u8], target: Option<u32>) -> usize {
         let offset = self.binary.len();

@@ -28,7 +28,7 @@ pub fn write_glb(
     let mut file = FileBuilder::for_scenes([(scene, pngs)].into_iter());
     let mesh = file.mesh(name, scene, pngs)?;
     let node = file.node(name, mesh, frame, extras);
-    Ok(file.finish(vec![node]))
+    file.finish(vec![node])
 }
 
 /// Writes `scene` as [`write_glb`] does, with images in files of their own (`uris`).
@@ -42,7 +42,7 @@ pub fn write_linked(
     let mut file = FileBuilder::default();
     let mesh = file.linked_mesh(name, scene, uris)?;
     let node = file.node(name, mesh, frame, extras.clone());
-    Ok(file.finish(vec![node]))
+    file.finish(vec![node])
 }
 
 /// Collects what goes into one file; several levels may share it.
@@ -268,17 +268,24 @@ impl FileBuilder {
     }
 
     /// The file with a scene of the given nodes.
-    pub fn finish(self, scene_nodes: Vec<usize>) -> Vec<u8> {
+    ///
+    /// # Errors
+    /// [`Error::Usage`] where it is too large for a GLB.
+    pub fn finish(self, scene_nodes: Vec<usize>) -> Result<Vec<u8>> {
         self.with_scenes(vec![json!({ "nodes": scene_nodes })])
     }
 
     /// The file with several scenes by name, the first of which is shown; no node is in two.
-    pub fn finish_scenes(self, scenes: &[(&str, Vec<usize>)]) -> Vec<u8> {
+    ///
+    /// # Errors
+    /// As [`FileBuilder::finish`].
+    pub fn finish_scenes(self, scenes: &[(&str, Vec<usize>)]) -> Result<Vec<u8>> {
         let scene = |(name, nodes): &(&str, Vec<usize>)| json!({ "name": name, "nodes": nodes });
         self.with_scenes(scenes.iter().map(scene).collect())
     }
 
-    fn with_scenes(mut self, scenes: Vec<Value>) -> Vec<u8> {
+    fn with_scenes(mut self, scenes: Vec<Value>) -> Result<Vec<u8>> {
+        fits(self.glb.bytes() as u64)?;
         if self.unlit {
             self.use_extension("KHR_materials_unlit");
         }
@@ -306,7 +313,23 @@ impl FileBuilder {
         if !self.required.is_empty() {
             root["extensionsRequired"] = json!(self.required);
         }
-        self.glb.finish(root)
+        Ok(self.glb.finish(root))
+    }
+}
+
+/// Bytes that the views of a GLB may have together: all lengths in it are numbers of 32 bits, and the JSON takes some, too.
+const MOST_BYTES: u64 = u32::MAX as u64 - (1 << 28);
+
+fn fits(bytes: u64) -> Result<()> {
+    match bytes <= MOST_BYTES {
+        true => Ok(()),
+        false => Err(Error::Usage {
+            what: format!(
+                "a file of this package would have {:.1} GB, and no GLB can have more than 4.2",
+                bytes as f64 / 1e9
+            ),
+            help: "start with fewer triangles, bake without --hierarchy, or lower texel_density in the recipe".into(),
+        }),
     }
 }
 
@@ -354,5 +377,20 @@ fn find_or_push(list: &mut Vec<Value>, value: Value) -> usize {
             list.push(value);
             list.len() - 1
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_whose_lengths_would_not_fit_is_an_error_that_says_its_size() {
+        assert!(fits(0).is_ok() && fits(4_000_000_000).is_ok());
+        let Err(error) = fits(5_100_000_000) else {
+            panic!("5.1 GB are too many");
+        };
+        assert!(error.to_string().contains("would have 5.1 GB"), "{error}");
+        assert_eq!(error.exit_code(), 2);
     }
 }
