@@ -130,6 +130,21 @@ impl Place {
     }
 }
 
+fn names(folder: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(folder).unwrap();
+    let mut names: Vec<String> = entries
+        .map(|e| e.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.sort();
+    names
+}
+
+fn glb_json(file: &Path) -> Value {
+    let bytes = std::fs::read(file).unwrap();
+    let length = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
+    serde_json::from_slice(&bytes[20..20 + length]).unwrap()
+}
+
 #[test]
 fn the_report_tells_what_level_0_costs_as_it_is_written() {
     let place = Place::new();
@@ -145,21 +160,6 @@ fn the_report_tells_what_level_0_costs_as_it_is_written() {
     let calls: usize = written.meshes().map(|m| m.primitives().count()).sum();
     // Of five in the source.
     assert_eq!((original.draw_calls, calls), (2, 2));
-}
-
-fn names(folder: &Path) -> Vec<String> {
-    let entries = std::fs::read_dir(folder).unwrap();
-    let mut names: Vec<String> = entries
-        .map(|e| e.unwrap().file_name().into_string().unwrap())
-        .collect();
-    names.sort();
-    names
-}
-
-fn glb_json(file: &Path) -> Value {
-    let bytes = std::fs::read(file).unwrap();
-    let length = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
-    serde_json::from_slice(&bytes[20..20 + length]).unwrap()
 }
 
 #[test]

@@ -93,7 +93,7 @@ struct Drawn {
     corners: [Vec2; 3],
     /// Their depths along the card's normal.
     depths: [f32; 3],
-    /// Its rows that lie at or below the card's first.
+    /// The rows that it reaches; they may go on below the card's last.
     rows: Range<u32>,
 }
 

@@ -145,7 +145,7 @@ pub(crate) mod tests {
         let at = |chart: &Chart, p: Vec3| {
             let [x, y] = chart.atlas_point(p).to_array().map(|t| t as usize);
             let texel = y * foliage.size[0] as usize + x;
-            (foliage.texels.at(texel).color(), foliage.alpha[texel])
+            (foliage.texels.color(texel), foliage.alpha[texel])
         };
         for i in 0..40 {
             for j in 0..40 {

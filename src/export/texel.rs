@@ -1,4 +1,4 @@
-//! Texels as a page keeps them: a quarter of the size of the numbers that they are made from.
+//! Texels as a page keeps them: less than a third of the size of the numbers that they are made from.
 
 use std::sync::LazyLock;
 
@@ -106,6 +106,11 @@ impl Texels {
     /// Covered share of one, 0 to 1.
     pub fn coverage(&self, at: usize) -> f32 {
         share_of(self.color[at])
+    }
+
+    /// As [`Stored::color`].
+    pub fn color(&self, at: usize) -> Vec3 {
+        color_of(first_three(self.color[at]))
     }
 
     /// Covered shares of all, 0 to 1.

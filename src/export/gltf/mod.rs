@@ -325,8 +325,9 @@ fn fits(bytes: u64) -> Result<()> {
         true => Ok(()),
         false => Err(Error::Usage {
             what: format!(
-                "a file of this package would have {:.1} GB, and no GLB can have more than 4.2",
-                bytes as f64 / 1e9
+                "a file of this package would have {:.1} GB beside its JSON, and in a GLB there is room for {:.1}",
+                bytes as f64 / 1e9,
+                MOST_BYTES as f64 / 1e9
             ),
             help: "start with fewer triangles, bake without --hierarchy, or lower texel_density in the recipe".into(),
         }),
@@ -390,7 +391,12 @@ mod tests {
         let Err(error) = fits(5_100_000_000) else {
             panic!("5.1 GB are too many");
         };
-        assert!(error.to_string().contains("would have 5.1 GB"), "{error}");
+        assert!(
+            error
+                .to_string()
+                .contains("would have 5.1 GB beside its JSON, and in a GLB there is room for 4.0"),
+            "{error}"
+        );
         assert_eq!(error.exit_code(), 2);
     }
 }

@@ -50,12 +50,7 @@ impl Fitted<'_> {
         }
         Seen {
             opacity: self.opacity[at],
-            color: self
-                .foliage
-                .texels
-                .at(at)
-                .color()
-                .map(|c| c.max(0.0).sqrt()),
+            color: self.foliage.texels.color(at).map(|c| c.max(0.0).sqrt()),
         }
     }
 }
