@@ -77,7 +77,7 @@ pub struct Rung {
     pub triangles: u64,
     /// Height of the tree in pixels where it starts.
     pub height_px: f64,
-    /// Height in pixels where it ends; the last one is made for half of where it starts.
+    /// Height in pixels where it ends; 0: it never does.
     pub end_px: f64,
 }
 
@@ -95,7 +95,12 @@ pub fn rungs(wanted: &Wanted, scene: &Scene, all: u64, least: u64) -> Result<Vec
         (true, Wanted::Levels(_)) => halving(scene.first_height_px, limits.len()),
         (true, Wanted::Limits(_)) => spread(scene.first_height_px, &limits),
     };
-    let end = |i: usize| heights.get(i + 1).copied().unwrap_or(heights[i] / 2.0);
+    let end = |i: usize| {
+        heights
+            .get(i + 1)
+            .copied()
+            .unwrap_or(scene.vanish_height_px)
+    };
     let rung = |(i, &triangles): (usize, &u64)| Rung {
         triangles,
         height_px: heights[i],
@@ -104,18 +109,22 @@ pub fn rungs(wanted: &Wanted, scene: &Scene, all: u64, least: u64) -> Result<Vec
     Ok(limits.iter().enumerate().map(rung).collect())
 }
 
-/// The rungs that are seen in the scene, of a tree `height_m` high. What is left out costs nothing.
+/// The rungs that are seen in the scene, of a tree `height_m` high, none to farther than the scene's camera is. What is
+/// left out costs nothing.
 pub fn seen(rungs: Vec<Rung>, scene: &Scene, height_m: f64) -> Vec<Rung> {
-    let last = rungs.len().saturating_sub(1);
-    let shown = |(i, rung): (usize, Rung)| {
-        let end_px = match i == last {
-            true => scene.vanish_height_px,
-            false => rung.end_px,
-        };
-        let [start, end] = [rung.height_px, end_px].map(|px| scene.distance(height_m, px));
-        scene.shows(start, end).then_some(rung)
+    let shown = |rung: &Rung| {
+        let [start, end] = [rung.height_px, rung.end_px].map(|px| scene.distance(height_m, px));
+        scene.shows(start, end)
     };
-    rungs.into_iter().enumerate().filter_map(shown).collect()
+    let least_px = match scene.farthest_m {
+        0.0 => 0.0,
+        farthest_m => height_m * scene.focal_px() / farthest_m,
+    };
+    let to_the_end = |rung: Rung| Rung {
+        end_px: rung.end_px.max(least_px.min(rung.height_px)),
+        ..rung
+    };
+    rungs.into_iter().filter(shown).map(to_the_end).collect()
 }
 
 fn explicit(limits: &[Limit], all: u64, least: u64) -> Result<Vec<u64>> {
@@ -232,7 +241,8 @@ mod tests {
         assert_eq!(counts, [10_000, 3_000, 1_000, 24]);
         let heights: Vec<f64> = rungs.iter().map(|r| r.height_px).collect();
         assert_eq!(heights, [512.0, 256.0, 128.0, 64.0]);
-        assert_eq!((rungs[0].end_px, rungs[3].end_px), (256.0, 32.0));
+        // The last one never ends.
+        assert_eq!((rungs[0].end_px, rungs[3].end_px), (256.0, 0.0));
     }
 
     #[test]
@@ -279,6 +289,22 @@ mod tests {
         assert_eq!(heights(1000.0, 0.0), [64.0]);
         assert_eq!(heights(20.0, 73.0), [512.0, 256.0]);
         assert!(heights(0.0, 10.0).is_empty());
+    }
+
+    #[test]
+    fn no_level_is_made_for_farther_than_the_camera_goes() {
+        let ends = |farthest_m| -> Vec<f64> {
+            let scene = Scene {
+                farthest_m,
+                ..Scene::default()
+            };
+            let kept = seen(of(Wanted::default(), 100_000), &scene, 10.0);
+            kept.iter().map(|r| r.end_px.round()).collect()
+        };
+        assert_eq!(ends(0.0), [256.0, 128.0, 64.0, 0.0]);
+        assert_eq!(ends(292.3), [256.0, 128.0, 64.0, 32.0]);
+        // A pixel at 9,353 m.
+        assert_eq!(ends(9353.0 / 100.0), [256.0, 128.0, 100.0]);
     }
 
     #[test]

@@ -14,29 +14,29 @@ use crate::space::raster::{
 /// What the level should cover.
 #[derive(Clone, Debug)]
 pub struct AreaGoal {
-    /// Cameras that see the base level of the atlas.
-    pub near: Vec<Camera>,
-    /// The original's covered area in pixels, summed over the near cameras.
-    pub near_area: f64,
-    /// Cameras where the level starts.
-    pub own: Vec<Camera>,
+    /// From where the base level of the atlas is seen.
+    pub near: Sight,
+    /// As a client draws it: where the level starts, and at twice the distance of the one before each.
+    pub client: Vec<Sight>,
+}
+
+/// Cameras, and what they should see.
+#[derive(Clone, Debug)]
+pub struct Sight {
+    /// All at one distance.
+    pub cameras: Vec<Camera>,
     /// The original's covered area in pixels, summed over them.
-    pub own_area: f64,
-    /// Cameras at twice that distance.
-    pub far: Vec<Camera>,
-    /// The original's covered area in pixels, summed over them.
-    pub far_area: f64,
+    pub area: f64,
 }
 
 impl AreaGoal {
     /// The same from all cameras, of areas so many times smaller.
     pub fn over(&self, factor: f64) -> Self {
-        Self {
-            near_area: self.near_area / factor,
-            own_area: self.own_area / factor,
-            far_area: self.far_area / factor,
-            ..self.clone()
+        let mut out = self.clone();
+        for sight in [&mut out.near].into_iter().chain(&mut out.client) {
+            sight.area /= factor;
         }
+        out
     }
 }
 
@@ -81,29 +81,26 @@ impl Part {
 pub struct WoodSeen {
     /// From the near cameras, one sample a pixel.
     pub near: Vec<Mask>,
-    /// Where the level starts, as a client draws it.
-    pub own: Vec<Multisampled>,
-    /// At twice the distance, likewise.
-    pub far: Vec<Multisampled>,
+    /// For each of a client's sights what its cameras see.
+    pub client: Vec<Vec<Multisampled>>,
 }
 
 impl WoodSeen {
     /// Draws the wood for all cameras of a goal.
     pub fn new(level: &LevelScene, goal: &AreaGoal) -> Self {
         let wood = level.wood.scene();
-        let client = |cameras: &[Camera]| {
-            let draw = |camera: &Camera| {
-                let mut pixels = Multisampled::empty(camera);
-                pixels.draw(&wood, camera);
-                pixels
-            };
-            cameras.par_iter().map(draw).collect()
+        let draw = |camera: &Camera| {
+            let mut pixels = Multisampled::empty(camera);
+            pixels.draw(&wood, camera);
+            pixels
         };
-        let near = goal.near.par_iter();
+        let client = goal.client.iter();
+        let near = goal.near.cameras.par_iter();
         Self {
             near: near.map(|camera| coverage(&wood, camera, NEAR)).collect(),
-            own: client(&goal.own),
-            far: client(&goal.far),
+            client: client
+                .map(|sight| sight.cameras.par_iter().map(draw).collect())
+                .collect(),
         }
     }
 }
@@ -160,6 +157,18 @@ impl LevelScene {
             above: views.iter().map(|view| view.above).sum(),
             within: views.into_iter().flat_map(|view| view.within).collect(),
         }
+    }
+
+    /// Covered pixels of all cameras, from the base level, over the wood that each sees.
+    pub fn near_area(&self, cameras: &[Camera], wood: &[Mask]) -> f64 {
+        let cards = self.cards.scene();
+        let draw = |(camera, wood): (&Camera, &Mask)| {
+            let mut mask = wood.clone();
+            mask.draw(&cards, camera, Mips::Base);
+            mask.area()
+        };
+        let areas: Vec<f64> = cameras.par_iter().zip(wood).map(draw).collect();
+        areas.iter().sum()
     }
 
     /// Covered pixels of each camera, from the base level.

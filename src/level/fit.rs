@@ -11,7 +11,7 @@ use crate::error::Result;
 use crate::export::atlas::Layout;
 use crate::export::enough::enough;
 use crate::export::foliage::{self, BakeOptions, Foliage};
-use crate::export::level_scene::{AreaGoal, LevelScene};
+use crate::export::level_scene::{AreaGoal, LevelScene, Sight};
 use crate::export::matching::{CONTRAST_GUESS, Matched, Standing, match_area};
 use crate::export::original::{Original, camera};
 use crate::export::refine::{Refine, Target, refine};
@@ -31,6 +31,15 @@ fn near_height_px(request: LevelRequest) -> f32 {
 /// Of the training directions every third one is matched in area; every sixth one where the
 /// level is largest on the screen.
 const MATCHED: usize = 3;
+
+/// Distances at which a client's area is matched at most, each twice the one before.
+const SIGHTS: u32 = 4;
+
+/// How much farther than where it ends a level may be matched: the next one fades in.
+const BEYOND: f32 = 1.5;
+
+/// Trees of fewer pixels are not matched: they have too few to count.
+const LEAST_PX: f32 = 7.0;
 
 /// Times that the wood's radius is tried.
 const WOOD_TRIES: u32 = 4;
@@ -166,23 +175,28 @@ impl Baker<'_> {
     /// What the level should cover where it starts, and from afar.
     pub(super) fn goal(&self, request: LevelRequest) -> AreaGoal {
         let areas = self.original.areas();
-        let seen = |pixels: f32, every: usize| -> (Vec<Camera>, f64) {
+        let seen = |pixels: f32, every: usize| {
             let unit = pixels / self.original.height;
             let directions = self.original.directions.iter().step_by(every);
             let area: f64 = areas.iter().step_by(every).sum();
-            let cameras = directions.map(|d| camera(d, unit)).collect();
-            (cameras, area * f64::from(unit * unit))
+            Sight {
+                cameras: directions.map(|d| camera(d, unit)).collect(),
+                area: area * f64::from(unit * unit),
+            }
         };
-        let (near, near_area) = seen(near_height_px(request), MATCHED);
-        let (own, own_area) = seen(request.height_px, 2 * MATCHED);
-        let (far, far_area) = seen(request.height_px / 2.0, MATCHED);
+        let halved = |times: u32| request.height_px / (1u32 << times) as f32;
+        let own = seen(request.height_px, 2 * MATCHED);
+        let far = seen(halved(1), MATCHED);
+        let sees = |times: &u32| {
+            halved(*times) >= LEAST_PX && (1u32 << times) as f32 <= BEYOND * request.reach
+        };
+        let beyond = (2..SIGHTS).take_while(sees).map(halved);
         AreaGoal {
-            near,
-            near_area,
-            own,
-            own_area,
-            far,
-            far_area,
+            near: seen(near_height_px(request), MATCHED),
+            client: [own, far]
+                .into_iter()
+                .chain(beyond.map(|px| seen(px, 1)))
+                .collect(),
         }
     }
 
@@ -218,7 +232,7 @@ fn gap(original: &Original, request: LevelRequest) -> f32 {
 fn grown(foliage: &Foliage, wood: &[Surface], goal: &AreaGoal, gap: f32) -> f64 {
     let area = |foliage: &Foliage| {
         let level = LevelScene::new(foliage, 0..foliage.charts.len(), wood);
-        level.near_areas(&goal.near).iter().sum::<f64>()
+        level.near_areas(&goal.near.cameras).iter().sum::<f64>()
     };
     let mut both = foliage.without_texels();
     both.add_backs(gap);

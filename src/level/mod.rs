@@ -59,6 +59,8 @@ pub struct LevelRequest {
     pub triangles: u64,
     /// Height of the tree in pixels where the level starts.
     pub height_px: f32,
+    /// It is shown to so many times the distance where it starts; infinite: it never ends.
+    pub reach: f32,
     /// Height of the tree in texels of its cards.
     pub height_texels: f32,
     /// It starts no nearer than where its error (root mean square) is so many pixels.
@@ -75,6 +77,7 @@ impl LevelRequest {
         Self {
             triangles: rung.triangles,
             height_px,
+            reach: height_px / rung.end_px as f32,
             height_texels: height_px.max(least),
             most_error_px: None,
         }

@@ -260,7 +260,7 @@ impl Page {
                 scene: on_page(fitted.wood.clone(), surface, images.clone(), material),
                 request: fitted.request,
                 plan: fitted.plan.clone(),
-                matched: self.matched,
+                matched: self.matched.clone(),
                 charts: foliage.charts[charts].to_vec(),
                 atlas: foliage.size,
                 density: guest.baker.density(fitted.request) * finer,

@@ -41,14 +41,15 @@ pub struct Look {
     pub sigma: f64,
 }
 
-/// Bakes a tile of at most so many triangles; `None` where the tile itself has no more.
+/// Bakes a tile of at most so many triangles, shown to `reach` times the distance where it takes over; `None` where the
+/// tile itself has no more.
 ///
 /// # Errors
 /// [`Error::Interrupted`](crate::error::Error::Interrupted).
 pub fn look(
     tree: &Tree,
     (recipe, scene): (&Recipe, &Scene),
-    triangles: u64,
+    (triangles, reach): (u64, f32),
     watch: &dyn Watch,
 ) -> Result<Option<Look>> {
     if triangles >= tree.model.triangles.len() as u64 {
@@ -72,6 +73,7 @@ pub fn look(
     let request = LevelRequest {
         triangles,
         height_px: height_texels,
+        reach,
         height_texels,
         most_error_px: Some(recipe.tile_error_px),
     };

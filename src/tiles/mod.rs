@@ -30,6 +30,9 @@ const SHARES: usize = 128;
 /// Times the least that loose pieces hold before they are halved.
 const LOOSE: usize = 4;
 
+/// From about so many times a tile's distance on its carrier stands for it.
+const REACH: f32 = 2.0;
+
 /// Bakes and writes the hierarchy of a tree; returns what the manifest says of it, and the names of
 /// the images that its files share.
 ///
@@ -106,11 +109,11 @@ fn tile(
     watch: &dyn Watch,
 ) -> Result<Made> {
     let part = branch(tree, &found.triangles);
-    let triangles = match index {
-        0 => WHOLE_TREE_TRIANGLES,
-        _ => u64::from(recipe.tile_triangles),
+    let wanted = match index {
+        0 => (WHOLE_TREE_TRIANGLES, f32::INFINITY),
+        _ => (u64::from(recipe.tile_triangles), REACH),
     };
-    let look = look(&part, (recipe, scene), triangles, &Quiet(watch))?;
+    let look = look(&part, (recipe, scene), wanted, &Quiet(watch))?;
     let mut tile = Tile {
         parent,
         ..describe(index, found, &part, look.as_ref(), scene)
