@@ -12,11 +12,12 @@ use super::rule::{MIPS, Rule};
 use super::stands::Stands;
 use crate::export::foliage::Foliage;
 
-/// Times that everything is drawn.
-const ROUNDS: u32 = 12;
+/// Times that everything is drawn, least and most: as often as pages of so many texels take no longer than one of them.
+const ROUNDS: [usize; 2] = [4, 12];
+const TEXELS: usize = 3 << 20;
 
-/// The last of them only settle the threshold.
-const SETTLING: u32 = 3;
+/// The last quarter of the rounds only settles the threshold.
+const SETTLING: usize = 4;
 
 /// A threshold is looked for so far around the last one first.
 const RANGE: f32 = 0.15;
@@ -70,7 +71,9 @@ pub fn keep(stands: &mut Stands, foliage: &mut Foliage, found: &mut Matched) {
     };
     let mut knobs = Knobs::new(found, Survey::new(stands.scores(), foliage.size, &rule));
     let mut swell = 1.0;
-    for round in 0..ROUNDS {
+    let [least, most] = ROUNDS;
+    let rounds = (TEXELS / stands.scores().len().max(1)).clamp(least, most);
+    for round in 0..rounds {
         if best.loss < ENOUGH {
             break;
         }
@@ -92,7 +95,7 @@ pub fn keep(stands: &mut Stands, foliage: &mut Foliage, found: &mut Matched) {
             let found = found.clone();
             best = Tried { rule, found, loss };
         }
-        if round + SETTLING < ROUNDS {
+        if round + rounds / SETTLING < rounds {
             knobs.turn(found, &mips);
         }
     }
