@@ -80,13 +80,14 @@ pub struct Scene {
     pub first_height_px: f64,
     /// Heights in pixels where each level starts, falling; empty: by `first_height_px`.
     pub heights_px: Vec<f64>,
-    /// Height in pixels under which nothing is drawn, 0 to 64; default 0: never.
+    /// Height in pixels under which nothing is drawn, 0 to 64; default 0: never. The last level's area is matched
+    /// to there, at most to eight times the distance where it starts.
     pub vanish_height_px: f64,
     /// Nearest that a camera comes to the middle of a tree, metres; default 0. Levels that end
     /// before are not baked.
     pub nearest_m: f64,
     /// Farthest that a tree is drawn, metres; default 0: no end. Levels that start behind are not
-    /// baked.
+    /// baked, the area of others is not matched beyond.
     pub farthest_m: f64,
     /// Azimuths from which trees are seen, from and to, degrees around y, at most 360 apart: 0 looks from +z, 90
     /// from +x; default (0, 360): from all around. Levels are fitted and judged from there alone, and the sides of
