@@ -47,7 +47,7 @@ const DEAR: [f64; 3] = [400.0, 60.0, 60.0];
 
 /// How dear it is, beside errors from beyond, that leaves swell or shrink where blocks are lifted or lowered: the
 /// threshold keeps the area, but what is opaque from near is less what the fit wants.
-const BLURRED: f64 = 2.0;
+const BLURRED: f64 = 8.0;
 
 /// Alpha as it was tried.
 struct Tried {
