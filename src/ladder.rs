@@ -120,11 +120,15 @@ pub fn seen(rungs: Vec<Rung>, scene: &Scene, height_m: f64) -> Vec<Rung> {
         0.0 => 0.0,
         farthest_m => height_m * scene.focal_px() / farthest_m,
     };
-    let to_the_end = |rung: Rung| Rung {
+    let as_far_as_seen = |rung: Rung| Rung {
         end_px: rung.end_px.max(least_px.min(rung.height_px)),
         ..rung
     };
-    rungs.into_iter().filter(shown).map(to_the_end).collect()
+    rungs
+        .into_iter()
+        .filter(shown)
+        .map(as_far_as_seen)
+        .collect()
 }
 
 fn explicit(limits: &[Limit], all: u64, least: u64) -> Result<Vec<u64>> {

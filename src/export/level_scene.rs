@@ -161,25 +161,22 @@ impl LevelScene {
 
     /// Covered pixels of all cameras, from the base level, over the wood that each sees.
     pub fn near_area(&self, cameras: &[Camera], wood: &[Mask]) -> f64 {
-        let cards = self.cards.scene();
-        let draw = |(camera, wood): (&Camera, &Mask)| {
-            let mut mask = wood.clone();
-            mask.draw(&cards, camera, Mips::Base);
-            mask.area()
-        };
-        let areas: Vec<f64> = cameras.par_iter().zip(wood).map(draw).collect();
+        let both = cameras.par_iter().zip(wood);
+        let areas: Vec<f64> = both.map(|(c, wood)| self.over(wood.clone(), c)).collect();
         areas.iter().sum()
     }
 
     /// Covered pixels of each camera, from the base level.
     pub fn near_areas(&self, cameras: &[Camera]) -> Vec<f64> {
-        let (cards, wood) = (self.cards.scene(), self.wood.scene());
-        let area = |camera: &Camera| {
-            let mut mask = coverage(&wood, camera, NEAR);
-            mask.draw(&cards, camera, Mips::Base);
-            mask.area()
-        };
+        let wood = self.wood.scene();
+        let area = |camera: &Camera| self.over(coverage(&wood, camera, NEAR), camera);
         cameras.par_iter().map(area).collect()
+    }
+
+    /// Pixels that the cards cover from near together with what is covered.
+    fn over(&self, mut covered: Mask, camera: &Camera) -> f64 {
+        covered.draw(&self.cards.scene(), camera, Mips::Base);
+        covered.area()
     }
 
     /// Covered pixels of all cameras as a client draws them, over the wood that each sees.

@@ -12,7 +12,7 @@ use crate::export::atlas::Layout;
 use crate::export::enough::enough;
 use crate::export::foliage::{self, BakeOptions, Foliage};
 use crate::export::level_scene::{AreaGoal, LevelScene, Sight};
-use crate::export::matching::{CONTRAST_GUESS, Matched, Standing, match_area};
+use crate::export::matching::{CONTRAST_GUESS, Matched, Matching, Standing};
 use crate::export::original::{Original, camera};
 use crate::export::refine::{Refine, Target, refine};
 use crate::export::surface::{Scene, Surface, scene_of_wood};
@@ -119,18 +119,24 @@ impl Baker<'_> {
                 wood: &wood.surfaces,
                 goal: &goal,
             };
-            let mut matched =
-                match_area(&mut foliage, score, std::slice::from_ref(&standing), guess);
+            let smaller;
+            let mut matching = Matching::new(&foliage, score, std::slice::from_ref(&standing));
+            let mut matched = matching.area(&mut foliage, guess);
             if let Some(score) = again {
-                let grown = grown(&foliage, &wood.surfaces, &goal, gap(self.original, request));
-                let goal = &goal.over(grown);
-                let smaller = Standing { goal, ..standing };
-                matched = match_area(&mut foliage, score, &[smaller], matched.contrast);
+                let gap = gap(self.original, request);
+                smaller = goal.over(grown(&foliage, &wood.surfaces, &goal, gap));
+                let standing = Standing {
+                    goal: &smaller,
+                    ..standing
+                };
+                matching = Matching::new(&foliage, score, &[standing]);
+                matched = matching.area(&mut foliage, matched.contrast);
             }
             tries += 1;
             guess = matched.contrast;
             let over = matched.near_ratio;
             if tries == WOOD_TRIES || plan.tubes.is_empty() || over <= 1.0 + WOOD_TOLERANCE {
+                matching.from_afar(&mut foliage, &mut matched);
                 return Ok(Fitted {
                     request,
                     plan,

@@ -9,7 +9,7 @@ use crate::export::atlas::MAX_SIDE;
 use crate::export::coarser::coarsen_light;
 use crate::export::foliage::material;
 use crate::export::level_scene::AreaGoal;
-use crate::export::matching::{CONTRAST_GUESS, Matched, Standing, match_area};
+use crate::export::matching::{CONTRAST_GUESS, Matched, Matching, Standing};
 use crate::export::refine::{Target, f1, refine};
 use crate::export::share::{self, Cards, Kin, Lone, Plan, Shared, kin, lone, share};
 use crate::watch::{Watch, part};
@@ -191,7 +191,9 @@ impl<'a> Table<'a> {
             [only] => only.fitted.matched.contrast,
             _ => CONTRAST_GUESS,
         };
-        let matched = match_area(&mut shared.foliage, score, &standing, guess);
+        let mut matching = Matching::new(&shared.foliage, score, &standing);
+        let mut matched = matching.area(&mut shared.foliage, guess);
+        matching.from_afar(&mut shared.foliage, &mut matched);
         let good = |(i, &least): (usize, &f64)| {
             f1(&shared.foliage, self.charts[i].clone(), &self.targets[i]) >= least
         };

@@ -128,7 +128,7 @@ mod tests {
         let stages = clock.finish();
         let names: Vec<&str> = stages.iter().map(|s| s.name.as_str()).collect();
         assert_eq!(names, ["start", "load", "fit"]);
+        // Sleeping takes no less; how much more is the machine's affair.
         assert!(stages[1].seconds >= 0.006 && stages[2].seconds >= 0.003);
-        assert!(stages[1].seconds > stages[2].seconds);
     }
 }

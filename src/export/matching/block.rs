@@ -24,7 +24,7 @@ struct Span {
 impl Span {
     /// On its side of the cutoff, if it can be.
     #[inline]
-    fn put(mut self, passes: bool) -> Self {
+    fn on_side(mut self, passes: bool) -> Self {
         if passes && self.high >= PASSING {
             self.low = self.low.max(PASSING);
             self.own = self.own.max(self.low);
@@ -92,21 +92,22 @@ impl Block {
     /// What may become of its mips, given which of their texels pass.
     pub fn join(&mut self, rule: &Rule) {
         for mip in 0..self.halvings {
+            let side = self.side(mip);
             let (from, to) = (self.starts[mip], self.starts[mip + 1]);
             let (finer, coarser) = self.spans.split_at_mut(to);
-            let (dim, dimmer) = self.opacity.split_at_mut(to);
-            let (finer, dim) = (&finer[from..], &dim[from..]);
-            each_four(1 << (self.halvings - mip), |at, four| {
-                let four = four.map(|i| (finer[i], dim[i]));
+            let (seen, coarser_seen) = self.opacity.split_at_mut(to);
+            let (finer, seen) = (&finer[from..], &seen[from..]);
+            each_four(side, |at, four| {
+                let four = four.map(|i| (finer[i], seen[i]));
                 let mean = |of: fn(&(Span, f32)) -> f32| four.iter().map(of).sum::<f32>() / 4.0;
-                dimmer[at] = mean(|(_, opacity)| *opacity);
+                coarser_seen[at] = mean(|(_, opacity)| *opacity);
                 let span = Span {
                     low: mean(|(span, _)| span.low),
                     high: mean(|(span, _)| span.high),
                     own: mean(|(span, _)| span.own),
                 };
                 coarser[at] = match rule.passes[mip] {
-                    Some(least) => span.put(dimmer[at] >= least),
+                    Some(least) => span.on_side(coarser_seen[at] >= least),
                     None => span,
                 };
             });
@@ -117,9 +118,10 @@ impl Block {
     /// way that it can.
     pub fn share_out(&mut self) {
         for mip in (0..self.halvings).rev() {
+            let side = self.side(mip);
             let (finer, coarser) = self.spans.split_at_mut(self.starts[mip + 1]);
             let finer = &mut finer[self.starts[mip]..];
-            each_four(1 << (self.halvings - mip), |at, four| {
+            each_four(side, |at, four| {
                 let sum = |of: fn(&Span) -> f32| four.iter().map(|&i| of(&finer[i])).sum::<f32>();
                 let own = sum(|s| s.own);
                 let more = 4.0 * coarser[at].own - own;

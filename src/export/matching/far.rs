@@ -12,8 +12,10 @@ use super::rule::{MIPS, Rule};
 use super::stands::Stands;
 use crate::export::foliage::Foliage;
 
-/// Times that everything is drawn, least and most: as often as pages of so many texels take no longer than one of them.
+/// Times that everything is drawn, least and most.
 const ROUNDS: [usize; 2] = [4, 12];
+
+/// Texels that all rounds together go through: the larger the page, the fewer rounds.
 const TEXELS: usize = 3 << 20;
 
 /// The last quarter of the rounds only settles the threshold.
@@ -69,14 +71,14 @@ pub fn keep(stands: &mut Stands, foliage: &mut Foliage, found: &mut Matched) {
         found: found.clone(),
         rule,
     };
-    let mut knobs = Knobs::new(found, Survey::new(stands.scores(), foliage.size, &rule));
+    if best.loss < ENOUGH {
+        return;
+    }
+    let mut tuning = Tuning::new(found, Survey::new(stands.scores(), foliage.size, &rule));
     let mut swell = 1.0;
     let [least, most] = ROUNDS;
     let rounds = (TEXELS / stands.scores().len().max(1)).clamp(least, most);
     for round in 0..rounds {
-        if best.loss < ENOUGH {
-            break;
-        }
         let range = [found.threshold - RANGE, found.threshold + RANGE];
         rule.alphas = found.alphas();
         let part;
@@ -84,7 +86,7 @@ pub fn keep(stands: &mut Stands, foliage: &mut Foliage, found: &mut Matched) {
         rule.threshold = found.threshold;
         let survey = Survey::new(stands.scores(), foliage.size, &rule);
         for &(_, mip) in &mips {
-            rule.passes[mip] = Some(survey.least(mip, knobs.shares[mip]));
+            rule.passes[mip] = Some(survey.least(mip, tuning.shares[mip]));
         }
         stands.fill(foliage, &rule);
         let near = stands.near_ratio();
@@ -95,8 +97,11 @@ pub fn keep(stands: &mut Stands, foliage: &mut Foliage, found: &mut Matched) {
             let found = found.clone();
             best = Tried { rule, found, loss };
         }
+        if best.loss < ENOUGH {
+            break;
+        }
         if round + rounds / SETTLING < rounds {
-            knobs.turn(found, &mips);
+            tuning.change(found, &mips);
         }
     }
     stands.fill(foliage, &best.rule);
@@ -104,7 +109,7 @@ pub fn keep(stands: &mut Stands, foliage: &mut Foliage, found: &mut Matched) {
 }
 
 /// What alpha is made of, beside its threshold.
-struct Knobs {
+struct Tuning {
     /// Of each mip the share of the page that passes, over that of texels which are opaque.
     shares: [f32; MIPS],
     lowest: f64,
@@ -114,7 +119,7 @@ struct Knobs {
     before: Option<(i32, f64)>,
 }
 
-impl Knobs {
+impl Tuning {
     fn new(found: &Matched, survey: Survey) -> Self {
         Self {
             shares: survey.shares().map(|share| share.max(SHARES[0])),
@@ -124,8 +129,8 @@ impl Knobs {
         }
     }
 
-    /// Turns them so that areas come nearer to the original's.
-    fn turn(&mut self, found: &mut Matched, mips: &[(usize, usize)]) {
+    /// Changes it so that areas come nearer to the original's.
+    fn change(&mut self, found: &mut Matched, mips: &[(usize, usize)]) {
         let over = found.balance();
         if let Some((contrast, area)) = self.before.replace((found.contrast, over))
             && contrast != found.contrast

@@ -35,45 +35,61 @@ const FIRST_RANGE: f32 = 0.25;
 /// contrast has made: on an oak's levels a step moves it by .0026. Beyond that all are looked at again.
 const RANGE: [f32; 2] = [0.02, 0.005];
 
-/// Sets the alpha of `foliage` from `score` so that cards and wood of all its trees together cover what
-/// their originals cover; the search begins at the contrast `guess`.
-pub fn match_area(
-    foliage: &mut Foliage,
-    score: Vec<f32>,
-    trees: &[Standing],
-    guess: i32,
-) -> Matched {
-    let mut found = Matched {
-        threshold: 0.5,
-        ..Matched::default()
-    };
-    if foliage.charts.is_empty() {
-        return found;
+/// The search for the alpha of a page, of which trees have cards.
+pub struct Matching<'a> {
+    /// `None` where there are no cards.
+    stands: Option<Stands<'a>>,
+}
+
+impl<'a> Matching<'a> {
+    /// Alpha is to come from `score`, one a texel.
+    pub fn new(foliage: &Foliage, score: Vec<f32>, trees: &[Standing<'a>]) -> Self {
+        let cards = !foliage.charts.is_empty();
+        Self {
+            stands: cards.then(|| Stands::new(foliage, score, trees)),
+        }
     }
-    let mut stands = Stands::new(foliage, score, trees);
-    let search = Search {
-        range: [-HIGHEST_CONTRAST, HIGHEST_CONTRAST],
-        guess: guess.into(),
-        slope: AREA_A_STEP,
-        step: 48.0,
-        grain: 2.0,
-        tolerance: FAR_TOLERANCE,
-    };
-    let mut before = None;
-    search.falling(|contrast| {
-        found.contrast = contrast.round() as i32;
-        let range = match before.replace(found.contrast) {
-            None => FIRST_RANGE,
-            Some(before) => RANGE[0] + RANGE[1] * found.contrast.abs_diff(before) as f32,
+
+    /// Sets alpha so that cards and wood of all trees together cover what their originals cover, to twice
+    /// the distance where the level starts; the search begins at the contrast `guess`.
+    pub fn area(&mut self, foliage: &mut Foliage, guess: i32) -> Matched {
+        let mut found = Matched {
+            threshold: 0.5,
+            ..Matched::default()
         };
-        let range = [found.threshold - range, found.threshold + range];
-        (found.threshold, found.near_ratio) = stands.threshold(found.alphas(), range, 1.0);
-        stands.fill(foliage, &found.rule());
-        found.ratios = [0, 1].map(|sight| stands.client_ratio(sight)).to_vec();
-        1.0 - found.balance()
-    });
-    far::keep(&mut stands, foliage, &mut found);
-    found
+        let Some(stands) = &mut self.stands else {
+            return found;
+        };
+        let search = Search {
+            range: [-HIGHEST_CONTRAST, HIGHEST_CONTRAST],
+            guess: guess.into(),
+            slope: AREA_A_STEP,
+            step: 48.0,
+            grain: 2.0,
+            tolerance: FAR_TOLERANCE,
+        };
+        let mut before = None;
+        search.falling(|contrast| {
+            found.contrast = contrast.round() as i32;
+            let range = match before.replace(found.contrast) {
+                None => FIRST_RANGE,
+                Some(before) => RANGE[0] + RANGE[1] * found.contrast.abs_diff(before) as f32,
+            };
+            let range = [found.threshold - range, found.threshold + range];
+            (found.threshold, found.near_ratio) = stands.threshold(found.alphas(), range, 1.0);
+            stands.fill(foliage, &found.rule());
+            found.ratios = [0, 1].map(|sight| stands.client_ratio(sight)).to_vec();
+            1.0 - found.balance()
+        });
+        found
+    }
+
+    /// The same from as far as anybody looks, once the area is matched.
+    pub fn from_afar(self, foliage: &mut Foliage, found: &mut Matched) {
+        if let Some(mut stands) = self.stands {
+            far::keep(&mut stands, foliage, found);
+        }
+    }
 }
 
 #[cfg(test)]
@@ -146,7 +162,9 @@ mod tests {
             goal,
         };
         let (asked, all) = (standing(&asked), standing(&all));
-        let found = match_area(&mut foliage, score.clone(), &[asked], CONTRAST_GUESS);
+        let mut matching = Matching::new(&foliage, score.clone(), &[asked]);
+        let mut found = matching.area(&mut foliage, CONTRAST_GUESS);
+        matching.from_afar(&mut foliage, &mut found);
         let mut stands = Stands::new(&foliage, score, &[all]);
         stands.set_alpha(&foliage.alpha);
         let seen = stands.client_ratios();
