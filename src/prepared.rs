@@ -6,6 +6,7 @@ use crate::botany::recognise::{RecogniseOptions, recognise};
 use crate::botany::tree::Tree;
 use crate::detail::element::{Element, elements};
 use crate::detail::merge::{Hierarchy, merge};
+use crate::detail::opaque::Opaque;
 use crate::detail::wood::Wood;
 use crate::error::Result;
 use crate::export::manifest::{Provenance, Range};
@@ -78,6 +79,7 @@ pub struct Pieces<'t> {
     tree: &'t Tree,
     /// Its smallest pieces.
     pub elements: Vec<Element>,
+    opaque: Opaque,
     hierarchy: Hierarchy,
     wood: Wood<'t>,
     original: Original,
@@ -90,7 +92,8 @@ impl<'t> Pieces<'t> {
     /// [`Error::Interrupted`](crate::error::Error::Interrupted).
     pub fn new(tree: &'t Tree, recipe: &Recipe, scene: &Scene, watch: &dyn Watch) -> Result<Self> {
         begin(watch, "group and look", 1)?;
-        let elements = elements(tree);
+        let opaque = Opaque::of(tree);
+        let elements = elements(tree, &opaque);
         let (views, sector) = (recipe.training_views, scene.sector());
         // Groups are merged one after the other, which leaves other threads free.
         let (hierarchy, (wood, original)) = rayon::join(
@@ -103,6 +106,7 @@ impl<'t> Pieces<'t> {
         Ok(Self {
             tree,
             elements,
+            opaque,
             hierarchy,
             wood,
             original,
@@ -114,6 +118,7 @@ impl<'t> Pieces<'t> {
         Baker {
             tree: self.tree,
             elements: &self.elements,
+            opaque: &self.opaque,
             hierarchy: &self.hierarchy,
             wood: &self.wood,
             original: &self.original,

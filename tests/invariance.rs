@@ -16,6 +16,7 @@ use pleach::cloud::Outline;
 use pleach::detail::element::elements;
 use pleach::detail::level::Planner;
 use pleach::detail::merge::merge;
+use pleach::detail::opaque::Opaque;
 use pleach::detail::reassign::Reassign;
 use pleach::detail::tiles::{TileSize, tiles};
 use pleach::pipeline::{Limit, Request, Wanted, bake};
@@ -110,13 +111,15 @@ fn cut(tree: &Tree) -> ([usize; 2], f64) {
         most: usize::MAX,
     };
     let tiles = tiles(tree, size).iter().filter(|t| t.whole).count();
-    let mut elements = elements(tree);
+    let opaque = Opaque::of(tree);
+    let mut elements = elements(tree, &opaque);
     elements.retain(|e| e.chain.is_none());
     let hierarchy = merge(&elements, 0.01);
     let choices = vec![Vec::new(); elements.len()];
     let planner = Planner {
         model: &tree.model,
         elements: &elements,
+        opaque: &opaque,
         hierarchy: &hierarchy,
         choices: &choices,
         outline: Outline::Triangle,

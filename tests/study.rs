@@ -8,6 +8,7 @@ use pleach::botany::recognise::{RecogniseOptions, recognise};
 use pleach::botany::tree::Tree;
 use pleach::describe::Describer;
 use pleach::detail::element::elements;
+use pleach::detail::opaque::Opaque;
 use pleach::detail::optimal_distance::{TEXELS, aspects};
 use pleach::export::manifest::{Card, FORMAT, Level, Manifest, VERSION, Visibility};
 use pleach::runtime::{Density, Form, Hidden, Law, Occlusion, Plain};
@@ -30,7 +31,7 @@ fn tree(name: &str, leaves: u32) -> Tree {
 
 /// A manifest of a tree without levels.
 fn manifest(tree: &Tree) -> Manifest {
-    let (elements, scene) = (elements(tree), Scene::default());
+    let (elements, scene) = (elements(tree, &Opaque::of(tree)), Scene::default());
     let describer = Describer::new(tree, &elements, &scene);
     Manifest {
         format: FORMAT.into(),

@@ -30,8 +30,6 @@ pub struct Element {
     /// Surface that it shows: one side, opaque share only, half the surface for wood; normalised
     /// units squared, visibility not counted.
     pub area: f32,
-    /// Points whose convex hull holds all that is opaque; empty for wood: its triangles' corners.
-    pub outline: Vec<Vec3>,
     /// Wood so thick that it vanishes visibly where a card stands edge-on: never on a card.
     pub solid: bool,
     /// The skeleton chain, where the element is wood.
@@ -111,9 +109,9 @@ pub fn is_thick(tree: &Tree, chain: u32, radius: f32) -> bool {
     mean_radius(tree, chain) > radius || square > BARK_MEAN * radius * area
 }
 
-/// Splits a tree into elements: foliage first, in the order of the leaves, then wood by chain.
-pub fn elements(tree: &Tree) -> Vec<Element> {
-    let opacity = Opaque::of(tree);
+/// Splits a tree into elements: foliage first, in the order of the leaves, then wood by chain. `opacity` is that of
+/// the tree.
+pub fn elements(tree: &Tree, opacity: &Opaque) -> Vec<Element> {
     let visible = Visible::of(tree);
     let solid_radius = SOLID_SHARE * tree.model.height();
     let subtree_of_chain = subtree_of_chain(tree);
@@ -127,20 +125,15 @@ pub fn elements(tree: &Tree) -> Vec<Element> {
             sheet
         };
         let sheets = sheets(&tree.model, &leaf.triangles).into_iter();
-        let elements = sheets.map(|sheet| element(&tree.model, sheet, &opacity, None, subtree));
+        let elements = sheets.map(|sheet| element(&tree.model, sheet, opacity, None, subtree));
         elements.map(weight).collect::<Vec<_>>()
     };
     let mut out: Vec<Element> = tree.leaves.par_iter().flat_map_iter(of_leaf).collect();
     for (chain, triangles) in wood_by_chain(tree).into_iter().enumerate() {
         if !triangles.is_empty() {
             let subtree = subtree_of_chain[chain];
-            let mut wood = element(
-                &tree.model,
-                triangles,
-                &opacity,
-                Some(chain as u32),
-                subtree,
-            );
+            let chain_of_wood = Some(chain as u32);
+            let mut wood = element(&tree.model, triangles, opacity, chain_of_wood, subtree);
             wood.scale(visible.weight(wood.center));
             wood.solid = is_thick(tree, chain as u32, solid_radius);
             out.push(wood);
@@ -185,14 +178,6 @@ fn element(
         moments.add_triangle(corners, area);
     }
     let center = moments.mean.as_vec3();
-    let mut outline: Vec<Vec3> = match chain {
-        Some(_) => Vec::new(),
-        None => triangles
-            .iter()
-            .flat_map(|&t| opacity.outline(model, t))
-            .collect(),
-    };
-    outline.shrink_to_fit();
     // A tube of surface S covers S/4 in the mean over all directions, as a leaf of one-sided area
     // S/2 does (Cauchy): wood and leaves then weigh alike.
     if chain.is_some() {
@@ -201,7 +186,6 @@ fn element(
     }
     Element {
         area: moments.weight as f32,
-        outline,
         solid: false,
         triangles,
         moments,

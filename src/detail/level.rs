@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use super::element::Element;
 use super::merge::Hierarchy;
+use super::opaque::Opaque;
 use super::optimal_cut::{Choice, Drawn, Pruning};
 use super::reassign::{Reassign, reassign};
 use crate::botany::model::Model;
@@ -39,7 +40,9 @@ pub struct Planner<'a> {
     pub hierarchy: &'a Hierarchy,
     /// Choices of wood elements.
     pub choices: &'a [Vec<Choice>],
-    /// Points of each element that its card must hold.
+    /// What of their triangles is opaque.
+    pub opaque: &'a Opaque,
+    /// Outlines of cards.
     pub outline: Outline,
     /// How leaves move after the cut.
     pub reassign: Reassign,
@@ -96,11 +99,17 @@ impl Planner<'_> {
 
     /// Points whose convex hull holds all that is opaque of some elements.
     pub(super) fn points(&self, members: &[u32]) -> impl Iterator<Item = Vec3> {
-        let leaves = members.iter().map(|&e| &self.elements[e as usize]);
-        leaves.flat_map(|e| {
-            let wood = e.triangles.iter().filter(|_| e.outline.is_empty());
-            let corners = wood.flat_map(|&t| self.model.corners(t));
-            e.outline.iter().copied().chain(corners)
+        let elements = members.iter().map(|&e| &self.elements[e as usize]);
+        elements.flat_map(|e| {
+            let (leaf, wood) = match e.chain {
+                None => (&e.triangles[..], &[][..]),
+                Some(_) => (&[][..], &e.triangles[..]),
+            };
+            let corners = wood.iter().flat_map(|&t| self.model.corners(t));
+            let opaque = leaf
+                .iter()
+                .flat_map(|&t| self.opaque.outline(self.model, t));
+            opaque.chain(corners)
         })
     }
 }

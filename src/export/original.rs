@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use fixedbitset::FixedBitSet;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
@@ -160,7 +161,7 @@ impl Original {
                         let rows = drawn.samples.chunks(drawn.width.max(1) as usize);
                         pooled(rows.map(|row| row.iter().copied()), size, pool)
                     }
-                    None => vec![false; (size[0] * size[1]) as usize],
+                    None => FixedBitSet::new(),
                 };
                 Target {
                     right: view.right * cells,
@@ -181,17 +182,19 @@ fn pooled<R: Iterator<Item = u8>>(
     mut rows: impl Iterator<Item = R>,
     [w, h]: [u32; 2],
     pool: u32,
-) -> Vec<bool> {
-    let mut out = Vec::with_capacity((w * h) as usize);
+) -> FixedBitSet {
+    let mut out = FixedBitSet::with_capacity((w * h) as usize);
     let mut sums = vec![0u32; w as usize];
-    for _ in 0..h {
+    for first in (0..h * w).step_by(w.max(1) as usize) {
         sums.fill(0);
         for mut row in rows.by_ref().take(pool as usize) {
             for sum in &mut sums {
                 *sum += row.by_ref().take(pool as usize).map(u32::from).sum::<u32>();
             }
         }
-        out.extend(sums.iter().map(|sum| sum * 2 >= pool * pool));
+        for (cell, sum) in (first as usize..).zip(&sums) {
+            out.set(cell, sum * 2 >= pool * pool);
+        }
     }
     out
 }
@@ -243,7 +246,8 @@ mod tests {
         for pool in [2, 3] {
             let size = [11 / pool, 6 / pool];
             let cells = pooled((0..6).map(|y| bits.row(y)), size, pool);
-            for (at, cell) in (0..).zip(cells) {
+            for at in 0..size[0] * size[1] {
+                let cell = cells[at as usize];
                 let (x, y) = (at % size[0] * pool, at / size[0] * pool);
                 let inside = (y..y + pool).flat_map(|y| (x..x + pool).map(move |x| y * 11 + x));
                 let sum: u32 = inside.map(|i| u32::from(samples[i as usize])).sum();

@@ -14,6 +14,7 @@
 use std::ops::Range;
 use std::sync::LazyLock;
 
+use fixedbitset::FixedBitSet;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
@@ -33,9 +34,9 @@ pub struct Target {
     /// Width and height in cells.
     pub size: [u32; 2],
     /// Whether the original covers the cell.
-    pub wanted: Vec<bool>,
+    pub wanted: FixedBitSet,
     /// Whether geometry that is not on cards (tubes) covers the cell already.
-    pub taken: Vec<bool>,
+    pub taken: FixedBitSet,
     /// The charts that are seen: those of this tree, where several share a page.
     pub charts: Range<usize>,
 }
@@ -107,7 +108,7 @@ struct Shown<'f> {
     /// Of each chart its [`Chart::row_lengths`].
     rows: &'f [Vec<u32>],
     /// Whether each texel of a chart is opaque, in the chart's own order.
-    on: Vec<Vec<bool>>,
+    on: Vec<FixedBitSet>,
 }
 
 impl<'f> Shown<'f> {
@@ -120,12 +121,12 @@ impl<'f> Shown<'f> {
         let width = foliage.size[0];
         let of_chart = |chart: &Chart| {
             let [w, h] = chart.size;
-            let texels = (0..h).flat_map(|y| (0..w).map(move |x| [x, y]));
-            let opaque = |[x, y]: [u32; 2]| {
+            let mut on = FixedBitSet::with_capacity((w * h) as usize);
+            for (texel, [x, y]) in (0..h).flat_map(|y| (0..w).map(move |x| [x, y])).enumerate() {
                 let [ax, ay] = chart.in_atlas(x, y);
-                opaque((ay * width + ax) as usize)
-            };
-            texels.map(opaque).collect()
+                on.set(texel, opaque((ay * width + ax) as usize));
+            }
+            on
         };
         Self {
             on: foliage.charts.par_iter().map(of_chart).collect(),
@@ -136,7 +137,8 @@ impl<'f> Shown<'f> {
 
     /// How many opaque texels of some charts each cell sees, at most 255.
     fn count(&self, target: &Target, charts: &Range<usize>) -> Vec<u8> {
-        let mut counts = vec![0u8; target.wanted.len()];
+        let [w, h] = target.size;
+        let mut counts = vec![0u8; (w * h) as usize];
         for i in charts.clone() {
             let on = &self.on[i];
             let chart = (&self.foliage.charts[i], &self.rows[i][..]);
@@ -185,10 +187,10 @@ pub fn f1(foliage: &Foliage, charts: Range<usize>, targets: &[Target]) -> f64 {
     let on = Shown::new(foliage, &rows, |at| foliage.alpha[at] >= 128);
     let of_view = |target: &Target| {
         let counts = on.count(target, &charts);
-        let cells = target.wanted.iter().zip(&target.taken).zip(counts);
         let (mut both, mut any) = (0u64, 0u64);
-        for ((&wanted, &taken), count) in cells {
-            let covered = taken || count > 0;
+        for (cell, count) in counts.into_iter().enumerate() {
+            let wanted = target.wanted[cell];
+            let covered = target.taken[cell] || count > 0;
             both += 2 * u64::from(wanted && covered);
             any += u64::from(wanted) + u64::from(covered);
         }
@@ -219,9 +221,8 @@ static SAID: LazyLock<[[f32; 2]; 256]> = LazyLock::new(|| {
 /// For every cell a number that says, by [`SAID`], what it says to texels: how many cover it, up to
 /// two where that is wanted, and three more where it is not.
 fn opinions(target: &Target, mut counts: Vec<u8>) -> Vec<u8> {
-    let cells = target.wanted.iter().zip(&target.taken).zip(&mut counts);
-    for ((&wanted, &taken), count) in cells {
-        *count = match (taken, wanted) {
+    for (cell, count) in counts.iter_mut().enumerate() {
+        *count = match (target.taken[cell], target.wanted[cell]) {
             (true, _) => SILENT,
             (false, true) => (*count).min(SILENT),
             (false, false) => (*count).min(MOST) + SILENT + 1,
@@ -234,7 +235,7 @@ fn vote<'t>(
     chart: (&Chart, &[u32]),
     one_sided: bool,
     seen: impl Iterator<Item = (&'t Target, &'t Vec<u8>)>,
-    on: &[bool],
+    on: &FixedBitSet,
 ) -> Vec<Votes> {
     let mut sums = vec![(0.0f32, 0u32); on.len()];
     let said = &*SAID;
@@ -310,8 +311,8 @@ mod tests {
             down: Vec3::NEG_Y,
             base: Vec2::ZERO,
             size: [6, 1],
-            wanted: vec![true, true, true, false, false, true],
-            taken: vec![false, false, false, false, false, true],
+            wanted: [0, 1, 2, 5].into_iter().collect(),
+            taken: [5].into_iter().collect(),
             charts: 0..1,
         };
         let numbers = opinions(&target, vec![0, 1, 4, 0, 2, 0]);
@@ -327,20 +328,19 @@ mod tests {
 
     #[test]
     fn f1_is_twice_the_common_cells_over_both_areas() {
-        let target = |wanted: [bool; 4], taken: [bool; 4]| Target {
+        let target = |wanted: &[usize], taken: &[usize]| Target {
             right: Vec3::X,
             down: Vec3::NEG_Y,
             base: Vec2::ZERO,
             size: [4, 1],
-            wanted: wanted.to_vec(),
-            taken: taken.to_vec(),
+            wanted: wanted.iter().copied().collect(),
+            taken: taken.iter().copied().collect(),
             charts: 0..1,
         };
-        let (yes, no) = (true, false);
         // Three wanted, two covered, one of them wanted: 2 * 1 / (3 + 2).
-        let some = target([yes, yes, yes, no], [no, no, yes, yes]);
+        let some = target(&[0, 1, 2], &[2, 3]);
         // All right.
-        let all = target([yes, no, no, no], [yes, no, no, no]);
+        let all = target(&[0], &[0]);
         let nothing = Foliage::default();
         assert!((f1(&nothing, 0..0, std::slice::from_ref(&some)) - 0.4).abs() < 1e-12);
         assert!((f1(&nothing, 0..0, &[some, all]) - 0.7).abs() < 1e-12);

@@ -18,6 +18,7 @@ use crate::detail::adaptive_level::adaptive_level;
 use crate::detail::element::{Element, mean_radius};
 use crate::detail::level::{LevelPlan, Planner};
 use crate::detail::merge::Hierarchy;
+use crate::detail::opaque::Opaque;
 use crate::detail::optimal_cut::{Candidate, Choice, Pruning};
 use crate::detail::reassign::Reassign;
 use crate::detail::whole_tree::{crossed_quads, level_cards, whole_tree};
@@ -42,6 +43,8 @@ pub struct Baker<'a> {
     pub tree: &'a Tree,
     /// Its smallest pieces.
     pub elements: &'a [Element],
+    /// What of its triangles is opaque.
+    pub opaque: &'a Opaque,
     /// How they merge.
     pub hierarchy: &'a Hierarchy,
     /// The branches' tubes.
@@ -282,6 +285,7 @@ impl Baker<'_> {
         Planner {
             model: &self.tree.model,
             elements: self.elements,
+            opaque: self.opaque,
             hierarchy: self.hierarchy,
             choices,
             outline: self.outline(),

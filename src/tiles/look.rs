@@ -6,6 +6,7 @@ use crate::cloud::foliage::{Face, Foliage};
 use crate::cloud::occlusion::Occlusion;
 use crate::detail::element::{Element, elements, is_thick};
 use crate::detail::merge::merge;
+use crate::detail::opaque::Opaque;
 use crate::detail::optimal_distance::TEXELS;
 use crate::detail::wood::Wood;
 use crate::error::Result;
@@ -55,7 +56,8 @@ pub fn look(
     if triangles >= tree.model.triangles.len() as u64 {
         return Ok(None);
     }
-    let mut elements = elements(tree);
+    let opaque = Opaque::of(tree);
+    let mut elements = elements(tree, &opaque);
     for element in &mut elements {
         let thick = |chain| is_thick(tree, chain, SOLID_TEXELS / DENSITY);
         element.solid = element.chain.is_some_and(thick);
@@ -65,6 +67,7 @@ pub fn look(
     let baker = Baker {
         tree,
         elements: &elements,
+        opaque: &opaque,
         hierarchy: &merge(&elements, recipe.locality),
         wood: &Wood::new(tree, true),
         original: &Original::new(&tree.model, views, scene.sector(), SAMPLES * height_texels),

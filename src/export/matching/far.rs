@@ -47,6 +47,11 @@ const MOST_STEP: f64 = 48.0;
 /// beside errors from beyond: a hundredth of the area from near is as dear as four of these.
 const DEAR: [f64; 3] = [400.0, 60.0, 60.0];
 
+/// Where the level starts and at twice that distance areas may err by so much; what they err by beyond is `OUTSIDE` times
+/// as dear as errors from farther: a crown that swells is seen sooner than one that thins from afar.
+const BAND: f64 = 0.04;
+const OUTSIDE: f64 = 20.0;
+
 /// How dear it is, beside errors from beyond, that leaves swell or shrink where blocks are lifted or lowered: the
 /// threshold keeps the area, but what is opaque from near is less what the fit wants.
 const BLURRED: f64 = 8.0;
@@ -156,7 +161,7 @@ fn loss(found: &Matched, near: f64) -> f64 {
     let errors = [near].into_iter().chain(found.ratios.iter().copied());
     let errors = errors.map(|ratio| ratio.max(1e-3).ln().abs());
     let each = errors.enumerate().map(|(i, error)| match DEAR.get(i) {
-        Some(dear) => dear * error * error,
+        Some(dear) => dear * error * error + OUTSIDE * (error - BAND).max(0.0),
         None => error,
     });
     each.sum()
