@@ -1,5 +1,6 @@
 //! STEP 1: a glTF file becomes a [`Tree`].
 
+pub mod apart;
 pub mod attach;
 pub mod branch;
 pub mod grow;

@@ -3,7 +3,7 @@
 use super::model::Model;
 pub use super::organ::OrganRule;
 use super::tree::{NO_NODE, Organ, Tree};
-use super::{attach, leaf, organ, part, skeleton, stance, subtree};
+use super::{apart, attach, leaf, organ, part, skeleton, stance, subtree};
 use crate::error::{Error, Result};
 
 /// What the user may say about a model before it is recognised.
@@ -54,6 +54,10 @@ pub fn recognise(model: Model, options: &RecogniseOptions) -> Result<Tree> {
     };
     attach::attach_leaves(&mut tree, &mut warnings);
     tree.subtrees = subtree::build(&tree, &mut warnings);
+    let trees = apart::trees(&tree);
+    if trees > 1 {
+        warnings.push(apart::warning(trees));
+    }
     tree.warnings = warnings;
     debug_assert!(tree.wood_node.len() == tree.model.triangles.len());
     debug_assert!(

@@ -93,6 +93,82 @@ fn a_mesh_that_is_in_the_scene_twice_at_one_place_is_there_once() {
     assert!(warning.contains("lies exactly on another"), "{warning}");
 }
 
+#[test]
+fn coarser_levels_and_shapes_for_collisions_beside_a_tree_are_left_out() {
+    let mut file = File::triangle();
+    file.json["nodes"][0]["name"] = json!("Oak_LOD0");
+    let finest = file.load().unwrap();
+    let below = file.add("nodes", json!({ "mesh": 0, "translation": [0, 3, 0] }));
+    file.node(json!({ "name": "Oak_LOD1", "translation": [0, 0, 9], "children": [below] }));
+    file.node(json!({ "mesh": 0, "name": "Oak_LOD2", "scale": [3, 3, 3] }));
+    file.node(json!({ "mesh": 0, "name": "UCX_Oak_LOD0_00", "scale": [2, 2, 2] }));
+    let model = file.load().unwrap();
+    assert_eq!(world(&model), world(&finest));
+    let [levels, collisions] = model.warnings.as_slice() else {
+        panic!("{:?}", model.warnings);
+    };
+    assert!(
+        levels.contains("2 times, first: node 2 (Oak_LOD1)"),
+        "{levels}"
+    );
+    assert!(
+        collisions.contains("node 4 (UCX_Oak_LOD0_00)"),
+        "{collisions}"
+    );
+    // Of another name they are parts of the tree.
+    file.json["nodes"][2]["name"] = json!("crown");
+    assert_eq!(file.load().unwrap().triangles.len(), 2);
+}
+
+/// Two sheets that cross, ten high and two wide, on a square of 20 by 20 whose node has this place.
+fn post_on(square: Value) -> pleach::botany::Model {
+    let mut file = File::new();
+    let sheets = [
+        [-1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 10.0, 0.0],
+        [0.0, 0.0, -1.0, 0.0, 0.0, 1.0, 0.0, 10.0, 0.0],
+    ];
+    let p = file.floats("VEC3", sheets.as_flattened());
+    file.mesh(json!({ "attributes": { "POSITION": p } }));
+    let square_corners = [
+        -10.0, 0.0, -10.0, -10.0, 0.0, 10.0, 10.0, 0.0, 10.0, 10.0, 0.0, -10.0,
+    ];
+    let p = file.floats("VEC3", &square_corners);
+    let indices = file.u16s(&[0, 1, 2, 0, 2, 3]);
+    file.mesh(json!({ "attributes": { "POSITION": p }, "indices": indices }));
+    for (key, value) in square.as_object().unwrap() {
+        file.json["nodes"][1][key] = value.clone();
+    }
+    file.load().unwrap()
+}
+
+#[test]
+fn ground_under_a_tree_is_left_out_and_other_sheets_are_not() {
+    let tree = post_on(json!({ "name": "lawn", "translation": [3, -0.2, 3] }));
+    assert_eq!(tree.triangles.len(), 2);
+    // The frame is that of the tree alone.
+    assert!((tree.frame.center.y - 5.0).abs() < 1e-6);
+    assert!(tree.frame.radius < 5.5, "{}", tree.frame.radius);
+    let [warning] = tree.warnings.as_slice() else {
+        panic!("{:?}", tree.warnings);
+    };
+    assert!(
+        warning.contains("ground") && warning.contains("lawn"),
+        "{warning}"
+    );
+    let others = [
+        // Beside the tree, half way up, at its top, steep, and as small as a leaf.
+        json!({ "translation": [30, 0, 0] }),
+        json!({ "translation": [0, 5, 0] }),
+        json!({ "translation": [0, 10, 0] }),
+        json!({ "rotation": [0.38, 0, 0, 0.92] }),
+        json!({ "scale": [0.02, 1, 0.02] }),
+    ];
+    for place in others {
+        let model = post_on(place.clone());
+        assert_eq!(model.triangles.len(), 4, "{place}: {:?}", model.warnings);
+    }
+}
+
 /// A small tree-like heap of triangles in one mesh under two nodes.
 fn heap(change: impl Fn(&mut Value)) -> pleach::botany::Model {
     let mut file = File::new();

@@ -8,15 +8,19 @@
 //! container  bytes        -> JSON and binary chunk
 //! buffer     JSON, URIs   -> bytes of every buffer view (meshopt decompressed)
 //! scene      nodes        -> placements: which mesh stands where
+//! aside      names        -> nodes that are no part of the tree: coarser levels, shapes for collisions
 //! primitive  accessors    -> parts: the triangles of one primitive in its own space
+//! ground     placed parts -> those that are not the lawn under the tree
 //! material   textures     -> materials and decoded images
 //! normalise  placed parts -> the model in normalised space
 //! ```
 
 mod accessor;
+mod aside;
 mod buffer;
 mod container;
 mod copies;
+mod ground;
 mod image;
 mod json;
 mod material;
@@ -128,7 +132,8 @@ pub fn load_slice(bytes: &[u8], path: &Path, limits: &Limits) -> Result<Model> {
 
     let placements = scene::placements(&asset, &mut warnings)?;
     let mut materials = material::Materials::new(&asset, &placements, &mut warnings)?;
-    let parts = primitive::read_all(&asset, &placements, &materials, &mut warnings)?;
+    let mut parts = primitive::read_all(&asset, &placements, &materials, &mut warnings)?;
+    ground::drop_ground(&placements, &mut parts, &mut warnings);
     let mut model = normalise::assemble(&asset, placements, parts, &mut warnings)?;
     let mut file_bytes = asset.file_bytes;
     model.images = image::decode_all(&asset, &materials.images, &mut file_bytes)?;

@@ -5,6 +5,7 @@ use std::rc::Rc;
 use glam::{DMat4, DQuat, DVec3};
 
 use super::accessor::Integers;
+use super::aside;
 use super::buffer::{Asset, BROKEN};
 use super::json::Node;
 use super::skin;
@@ -24,11 +25,9 @@ pub(super) struct Placement {
 pub(super) fn placements(asset: &Asset, warnings: &mut Warnings) -> Result<Vec<Placement>> {
     let nodes = &asset.json.nodes;
     let mut seen = vec![false; nodes.len()];
-    let mut stack: Vec<(usize, DMat4)> = roots(asset, warnings)?
-        .into_iter()
-        .rev()
-        .map(|root| (root, DMat4::IDENTITY))
-        .collect();
+    let roots = of_the_tree(asset, &roots(asset, warnings)?, warnings);
+    let root = |node| (node, DMat4::IDENTITY);
+    let mut stack: Vec<(usize, DMat4)> = roots.into_iter().rev().map(root).collect();
     let mut out = Vec::new();
     let mut worlds: Vec<Option<DMat4>> = vec![None; nodes.len()];
     let mut skinned = Vec::new();
@@ -60,7 +59,8 @@ pub(super) fn placements(asset: &Asset, warnings: &mut Warnings) -> Result<Vec<P
             }
         }
         worlds[index] = Some(world_from_node);
-        stack.extend(node.children.iter().rev().map(|&c| (c, world_from_node)));
+        let children = of_the_tree(asset, &node.children, warnings);
+        stack.extend(children.into_iter().rev().map(|c| (c, world_from_node)));
         if stack.len() > nodes.len() {
             let what = "its children are more than the file's nodes: a node has two parents";
             return Err(asset.fault(place, what, BROKEN));
@@ -74,6 +74,20 @@ pub(super) fn placements(asset: &Asset, warnings: &mut Warnings) -> Result<Vec<P
         }
     }
     Ok(out)
+}
+
+/// Those of some nodes that stand beside each other which are not left out by their names.
+fn of_the_tree(asset: &Asset, siblings: &[usize], warnings: &mut Warnings) -> Vec<usize> {
+    let nodes = &asset.json.nodes;
+    let asides = aside::among(siblings, nodes, &asset.json.meshes);
+    let mut kept = Vec::with_capacity(siblings.len());
+    for (&node, aside) in siblings.iter().zip(asides) {
+        match aside {
+            Some(aside) => warnings.say(aside.what(), &node_place(node, &nodes[node])),
+            None => kept.push(node),
+        }
+    }
+    kept
 }
 
 /// Root nodes of the scene to show; without scenes, all nodes that are nobody's child.
