@@ -53,8 +53,9 @@ const BAND: f64 = 0.04;
 const OUTSIDE: f64 = 20.0;
 
 /// How dear it is, beside errors from beyond, that leaves swell or shrink where blocks are lifted or lowered: the
-/// threshold keeps the area, but what is opaque from near is less what the fit wants.
-const BLURRED: f64 = 8.0;
+/// threshold keeps the area, but what is opaque from near is less what the fit wants. With 8 an aspen's trunk of one
+/// texel was torn.
+const BLURRED: f64 = 16.0;
 
 /// Alpha as it was tried.
 struct Tried {
