@@ -120,6 +120,31 @@ fn coarser_levels_and_shapes_for_collisions_beside_a_tree_are_left_out() {
     assert_eq!(file.load().unwrap().triangles.len(), 2);
 }
 
+#[test]
+fn levels_that_another_node_names_are_left_out_of_the_scene() {
+    let mut file = File::triangle();
+    let finest = file.load().unwrap();
+    let level = file.add(
+        "nodes",
+        json!({ "mesh": 0, "name": "far", "scale": [3, 3, 3] }),
+    );
+    file.json["scenes"][0]["nodes"] = json!([0, level]);
+    assert_eq!(file.load().unwrap().triangles.len(), 2);
+    file.json["nodes"][0]["extensions"] = json!({ "MSFT_lod": { "ids": [level] } });
+    let model = file.load().unwrap();
+    assert_eq!(world(&model), world(&finest));
+    let [warning] = model.warnings.as_slice() else {
+        panic!("{:?}", model.warnings);
+    };
+    assert!(
+        warning.contains("MSFT_lod") && warning.contains("(far)"),
+        "{warning}"
+    );
+    // A node that names itself stays.
+    file.json["nodes"][0]["extensions"] = json!({ "MSFT_lod": { "ids": [0, 99] } });
+    assert_eq!(file.load().unwrap().triangles.len(), 2);
+}
+
 /// Two sheets that cross, ten high and two wide, on a square of 20 by 20 whose node has this place.
 fn post_on(square: Value) -> pleach::botany::Model {
     let mut file = File::new();
@@ -152,7 +177,7 @@ fn ground_under_a_tree_is_left_out_and_other_sheets_are_not() {
         panic!("{:?}", tree.warnings);
     };
     assert!(
-        warning.contains("ground") && warning.contains("lawn"),
+        warning.contains("ground") && warning.contains("(lawn, mesh 1, primitive 0)"),
         "{warning}"
     );
     let others = [

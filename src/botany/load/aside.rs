@@ -1,10 +1,10 @@
-//! Nodes that hold no part of the tree, as the names say that tools give them: coarser levels of a node beside them, and
-//! shapes for collisions.
+//! Nodes that hold no part of the tree, as the file says or the names that tools give them: coarser levels of another
+//! node, and shapes for collisions.
 //!
 //! Packages of game assets hold a tree several times over, and a client that knows nothing of that draws all of it on top
 //! of each other. A number says little, so a level is only what has one beside it with the same name and a smaller number.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use super::json::{Mesh, Node};
 
@@ -13,6 +13,8 @@ use super::json::{Mesh, Node};
 pub(super) enum Aside {
     /// A coarser level of another node, or the picture that stands for it from afar.
     Level,
+    /// The same, as another node says.
+    Named,
     /// It stops what runs into the tree, and is never drawn.
     Collision,
 }
@@ -24,6 +26,9 @@ impl Aside {
             Self::Level => {
                 "a node is a coarser level of another one by its name, and left out: levels are made from the finest; give \
                  it a name without LOD to keep it"
+            }
+            Self::Named => {
+                "a node stands in the scene beside another one that names it as its coarser level (MSFT_lod), and is left out"
             }
             Self::Collision => "a node is a shape for collisions by its name, and left out",
         }
@@ -39,7 +44,18 @@ const COLLISION_SUFFIXES: [&str; 2] = ["-colonly", "-convcolonly"];
 /// Names of pictures of the whole tree, the last level of some tools.
 const PICTURES: [&str; 3] = ["billboard", "impostor", "imposter"];
 
-/// Which of some nodes that stand beside each other are left out, in their order.
+/// The nodes that another one names as its coarser levels. They belong outside the scene, but stand in it in files that
+/// were taken apart and joined again.
+pub(super) fn named(nodes: &[Node]) -> HashSet<usize> {
+    let of = |(at, node): (usize, &Node)| {
+        let levels = node.extensions.as_deref()?.levels.as_ref()?;
+        let others = levels.ids.iter().copied().filter(move |&id| id != at);
+        Some(others.collect::<Vec<_>>())
+    };
+    nodes.iter().enumerate().filter_map(of).flatten().collect()
+}
+
+/// Which of some nodes that stand beside each other are left out by their names, in their order.
 pub(super) fn among(siblings: &[usize], nodes: &[Node], meshes: &[Mesh]) -> Vec<Option<Aside>> {
     let names: Vec<String> = siblings
         .iter()

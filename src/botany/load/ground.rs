@@ -54,9 +54,15 @@ impl Bounds {
 /// Drops parts that are ground, and says which.
 pub(super) fn drop_ground(placements: &[Placement], parts: &mut Parts, warnings: &mut Warnings) {
     let mut ground = find(placements, parts);
-    for &(at, _) in &ground {
+    for &(at, part) in &ground {
         let what = "a level sheet under the tree is taken for ground, and left out; join it with the trunk's mesh to keep it";
-        warnings.say(what, &placements[at].name);
+        let placed = &placements[at];
+        let primitive = parts[placed.mesh][part].primitive;
+        let place = format!(
+            "{}, mesh {}, primitive {primitive}",
+            placed.name, placed.mesh
+        );
+        warnings.say(what, place.trim_start_matches(", "));
     }
     // From the last on: numbers of those before stay.
     ground.sort_unstable_by_key(|&(at, part)| (placements[at].mesh, part));

@@ -60,6 +60,15 @@ pub(super) struct NodeExtensions {
     pub instancing: Option<Instancing>,
     #[serde(rename = "KHR_node_visibility")]
     pub visibility: Option<Visibility>,
+    #[serde(rename = "MSFT_lod")]
+    pub levels: Option<Coarser>,
+}
+
+/// The nodes that stand for one from afar.
+#[derive(Deserialize, Default)]
+#[serde(default)]
+pub(super) struct Coarser {
+    pub ids: Vec<usize>,
 }
 
 #[derive(Deserialize, Default)]

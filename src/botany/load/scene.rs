@@ -1,11 +1,12 @@
 //! Nodes: which mesh stands where in the world.
 
+use std::collections::HashSet;
 use std::rc::Rc;
 
 use glam::{DMat4, DQuat, DVec3};
 
 use super::accessor::Integers;
-use super::aside;
+use super::aside::{self, Aside};
 use super::buffer::{Asset, BROKEN};
 use super::json::Node;
 use super::skin;
@@ -25,7 +26,8 @@ pub(super) struct Placement {
 pub(super) fn placements(asset: &Asset, warnings: &mut Warnings) -> Result<Vec<Placement>> {
     let nodes = &asset.json.nodes;
     let mut seen = vec![false; nodes.len()];
-    let roots = of_the_tree(asset, &roots(asset, warnings)?, warnings);
+    let coarser = aside::named(nodes);
+    let roots = of_the_tree(asset, &roots(asset, warnings)?, &coarser, warnings);
     let root = |node| (node, DMat4::IDENTITY);
     let mut stack: Vec<(usize, DMat4)> = roots.into_iter().rev().map(root).collect();
     let mut out = Vec::new();
@@ -59,7 +61,7 @@ pub(super) fn placements(asset: &Asset, warnings: &mut Warnings) -> Result<Vec<P
             }
         }
         worlds[index] = Some(world_from_node);
-        let children = of_the_tree(asset, &node.children, warnings);
+        let children = of_the_tree(asset, &node.children, &coarser, warnings);
         stack.extend(children.into_iter().rev().map(|c| (c, world_from_node)));
         if stack.len() > nodes.len() {
             let what = "its children are more than the file's nodes: a node has two parents";
@@ -76,13 +78,20 @@ pub(super) fn placements(asset: &Asset, warnings: &mut Warnings) -> Result<Vec<P
     Ok(out)
 }
 
-/// Those of some nodes that stand beside each other which are not left out by their names.
-fn of_the_tree(asset: &Asset, siblings: &[usize], warnings: &mut Warnings) -> Vec<usize> {
+/// Those of some nodes that stand beside each other which are not left out: neither by their names, nor as `coarser`
+/// levels of others.
+fn of_the_tree(
+    asset: &Asset,
+    siblings: &[usize],
+    coarser: &HashSet<usize>,
+    warnings: &mut Warnings,
+) -> Vec<usize> {
     let nodes = &asset.json.nodes;
     let asides = aside::among(siblings, nodes, &asset.json.meshes);
     let mut kept = Vec::with_capacity(siblings.len());
     for (&node, aside) in siblings.iter().zip(asides) {
-        match aside {
+        let named = coarser.contains(&node).then_some(Aside::Named);
+        match aside.or(named) {
             Some(aside) => warnings.say(aside.what(), &node_place(node, &nodes[node])),
             None => kept.push(node),
         }
