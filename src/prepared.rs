@@ -100,8 +100,7 @@ impl<'t> Pieces<'t> {
             || merge(&elements, recipe.locality),
             || {
                 let wood = Wood::new(tree, true);
-                let original = Original::new(&tree.model, views, sector, MASK_HEIGHT);
-                (wood, original.with_tones(&tree.model))
+                (wood, Original::new(&tree.model, views, sector, MASK_HEIGHT))
             },
         );
         Ok(Self {

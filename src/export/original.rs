@@ -6,30 +6,20 @@ use fixedbitset::FixedBitSet;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
-use super::mip::halve;
 use super::refine::Target;
-use crate::botany::model::{Image, Model, Wrap};
+use crate::botany::model::{Model, Wrap};
 use crate::space::directions::Direction;
 use crate::space::raster::{
-    Camera, Geometry, Mask, Material, Mips, Sampling, Scene, Texture, Tone, coverage, tones,
+    Camera, Geometry, Mask, Material, Mips, Sampling, Scene, Texture, coverage,
 };
 use crate::space::sector::{Eyes, Sector};
 use crate::space::texture::cutoff;
 
 /// One sample each: masks are fine enough.
-pub const SAMPLING: Sampling = Sampling {
+const SAMPLING: Sampling = Sampling {
     side: 1,
     mips: Mips::Base,
 };
-
-/// Height of the tree in pixels for its mean colours: one sample each.
-const TONE_HEIGHT: f32 = 384.0;
-
-/// Colours are compared from so many of the training directions at least, or all.
-const TONED: usize = 8;
-
-/// Images are halved to this side first: a mean needs no more.
-const TONE_SIDE: u32 = 1024;
 
 /// Masks of the original from the training directions.
 pub struct Original {
@@ -43,9 +33,6 @@ pub struct Original {
     samples_per_unit: f32,
     /// Height of the tree in normalised units.
     pub height: f32,
-    /// Triangles that were seen, in order, and of each the pixels and the sums of the linear RGB of its base colour; empty
-    /// where that was not asked for.
-    tones: Vec<(u32, [f32; 4])>,
 }
 
 /// A mask in an eighth of its size: those of all directions wait for all levels.
@@ -108,7 +95,11 @@ impl Original {
             })
             .collect();
         let materials: Vec<Material> = model.materials.iter().map(raster_material).collect();
-        let triangle_material = materials_of_triangles(model);
+        let triangle_material: Vec<u32> = model
+            .triangle_object
+            .iter()
+            .map(|&o| model.objects[o as usize].material)
+            .collect();
         let scene = Scene {
             geometry: Geometry {
                 positions: &model.positions,
@@ -137,53 +128,7 @@ impl Original {
             directions,
             samples_per_unit,
             height,
-            tones: Vec::new(),
         }
-    }
-
-    /// With its colours.
-    pub fn with_tones(self, model: &Model) -> Self {
-        let colors = Colors::new(model);
-        let cameras: Vec<Camera> = self.toned_from(TONE_HEIGHT / self.height).collect();
-        let seen = cameras
-            .par_iter()
-            .map(|c| tones(&colors.scene(model), c, SAMPLING));
-        let seen: Vec<Vec<(u32, Tone)>> = seen.collect();
-        let mut all = vec![Tone::default(); model.triangles.len()];
-        for (triangle, tone) in seen.into_iter().flatten() {
-            all[triangle as usize].add(&tone);
-        }
-        let seen = (0..).zip(all).filter(|(_, tone)| tone.covered > 0.0);
-        let short = |tone: Tone| {
-            let [r, g, b] = tone.light;
-            [r, g, b, tone.covered].map(|v| v as f32)
-        };
-        let mut tones: Vec<_> = seen
-            .map(|(triangle, tone)| (triangle, short(tone)))
-            .collect();
-        tones.shrink_to_fit();
-        Self { tones, ..self }
-    }
-
-    /// What is seen of some triangles in the whole tree.
-    pub fn tone(&self, triangles: &FixedBitSet) -> Tone {
-        let some = self
-            .tones
-            .iter()
-            .filter(|(t, _)| triangles.contains(*t as usize));
-        let long = |&(_, [r, g, b, covered]): &(u32, [f32; 4])| Tone {
-            light: [r, g, b].map(f64::from),
-            covered: covered.into(),
-        };
-        some.map(long).sum()
-    }
-
-    /// From where colours are compared, at so many pixels a unit.
-    pub fn toned_from(&self, pixels: f32) -> impl Iterator<Item = Camera> + '_ {
-        self.directions
-            .iter()
-            .step_by(TONED)
-            .map(move |d| camera(d, pixels))
     }
 
     /// Height of the tree in samples of its masks.
@@ -230,58 +175,6 @@ impl Original {
             })
             .collect()
     }
-}
-
-/// The original as its mean colour is drawn.
-struct Colors {
-    materials: Vec<Material>,
-    textures: Vec<Texture>,
-    triangle_material: Vec<u32>,
-}
-
-impl Colors {
-    fn new(model: &Model) -> Self {
-        let mut is_seen = vec![false; model.images.len()];
-        for base in model.materials.iter().filter_map(|m| m.base_color) {
-            is_seen[base.image as usize] = true;
-        }
-        let texture = |(image, is_seen): (&Image, bool)| {
-            if !is_seen {
-                return Texture::from_alpha(1, 1, vec![255]);
-            }
-            let mut image = image.clone();
-            while image.width.max(image.height) > TONE_SIDE {
-                halve(&mut image, true);
-            }
-            Texture::base_of_rgba(image.width, image.height, &image.rgba)
-        };
-        let images: Vec<(&Image, bool)> = model.images.iter().zip(is_seen).collect();
-        Self {
-            materials: model.materials.iter().map(raster_material).collect(),
-            textures: images.into_par_iter().map(texture).collect(),
-            triangle_material: materials_of_triangles(model),
-        }
-    }
-
-    fn scene<'a>(&'a self, model: &'a Model) -> Scene<'a> {
-        Scene {
-            geometry: Geometry {
-                positions: &model.positions,
-                normals: &[],
-                uvs: [&model.uvs[0], &model.uvs[1]],
-                colors: &model.colors,
-                triangles: &model.triangles,
-                triangle_material: &self.triangle_material,
-            },
-            materials: &self.materials,
-            textures: &self.textures,
-        }
-    }
-}
-
-fn materials_of_triangles(model: &Model) -> Vec<u32> {
-    let of_object = |&o: &u32| model.objects[o as usize].material;
-    model.triangle_object.iter().map(of_object).collect()
 }
 
 /// Cells of `pool` x `pool` samples of which at least half are covered, from rows of samples.

@@ -5,7 +5,6 @@ mod few;
 mod fit;
 mod share;
 mod sided;
-mod tone;
 
 use glam::Vec3;
 

@@ -38,7 +38,6 @@ mod shade;
 mod shader;
 mod srgb;
 mod texture;
-mod tone;
 mod triangle;
 
 pub use camera::{Camera, Placement};
@@ -54,7 +53,6 @@ pub use relief::Relief;
 pub use shade::Light;
 pub use srgb::{linear_from_srgb, srgb_from_linear};
 pub use texture::Texture;
-pub use tone::{Tone, tone, tones};
 
 use glam::{Vec2, Vec3};
 

@@ -18,8 +18,6 @@ const KNOWN: usize = 256;
 
 /// What is seen at a sample.
 pub(super) struct Shaded {
-    /// Place of the triangle in the pane's list.
-    pub item: u32,
     /// Linear.
     pub light: [f32; 3],
     pub normal: Vec3,
@@ -189,7 +187,6 @@ impl<'a> Shader<'a> {
         }
         let lit = self.light.on(normal);
         let seen = Shaded {
-            item,
             light: albedo.map(|c| c * lit),
             normal,
             near,
