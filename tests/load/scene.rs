@@ -140,9 +140,22 @@ fn levels_that_another_node_names_are_left_out_of_the_scene() {
         warning.contains("MSFT_lod") && warning.contains("(far)"),
         "{warning}"
     );
-    // A node that names itself stays.
-    file.json["nodes"][0]["extensions"] = json!({ "MSFT_lod": { "ids": [0, 99] } });
-    assert_eq!(file.load().unwrap().triangles.len(), 2);
+    let mut loads = |first: Value, second: Value, roots: Value| {
+        let ids = |ids: Value| json!({ "MSFT_lod": { "ids": ids } });
+        file.json["nodes"][0]["extensions"] = ids(first);
+        file.json["nodes"][1]["extensions"] = ids(second);
+        file.json["scenes"][0]["nodes"] = roots;
+        file.load().map(|model| model.triangles.len())
+    };
+    // A node that names itself stays, and so do two that name each other, and one whose finer level is not shown.
+    assert_eq!(loads(json!([0, 99]), json!([]), json!([0, 1])).unwrap(), 2);
+    assert_eq!(loads(json!([1]), json!([0]), json!([0, 1])).unwrap(), 2);
+    assert_eq!(loads(json!([1]), json!([]), json!([1])).unwrap(), 1);
+    // The finer one need not come first.
+    assert_eq!(loads(json!([]), json!([0]), json!([0, 1])).unwrap(), 1);
+    // A node that is not there is an error, also where another one names it.
+    let error = loads(json!([99]), json!([]), json!([0, 99])).unwrap_err();
+    assert!(error.to_string().contains("there is no node 99"), "{error}");
 }
 
 /// Two sheets that cross, ten high and two wide, on a square of 20 by 20 whose node has this place.

@@ -44,15 +44,29 @@ const COLLISION_SUFFIXES: [&str; 2] = ["-colonly", "-convcolonly"];
 /// Names of pictures of the whole tree, the last level of some tools.
 const PICTURES: [&str; 3] = ["billboard", "impostor", "imposter"];
 
-/// The nodes that another one names as its coarser levels. They belong outside the scene, but stand in it in files that
-/// were taken apart and joined again.
-pub(super) fn named(nodes: &[Node]) -> HashSet<usize> {
-    let of = |(at, node): (usize, &Node)| {
-        let levels = node.extensions.as_deref()?.levels.as_ref()?;
-        let others = levels.ids.iter().copied().filter(move |&id| id != at);
-        Some(others.collect::<Vec<_>>())
-    };
-    nodes.iter().enumerate().filter_map(of).flatten().collect()
+/// The nodes that a node of the scene with these `roots` names as its coarser levels. They belong outside the scene, but
+/// stand in it in files that were taken apart and joined again. What is named itself names nothing: of two that name each
+/// other both are kept.
+pub(super) fn named(nodes: &[Node], roots: &[usize]) -> HashSet<usize> {
+    let mut claims: Vec<(usize, usize)> = Vec::new();
+    let mut seen = vec![false; nodes.len()];
+    let mut stack = roots.to_vec();
+    while let Some(at) = stack.pop() {
+        let Some(node) = nodes.get(at) else {
+            continue;
+        };
+        if std::mem::replace(&mut seen[at], true) {
+            continue;
+        }
+        stack.extend(&node.children);
+        let levels = node.extensions.as_deref().and_then(|e| e.levels.as_ref());
+        let ids = levels.into_iter().flat_map(|levels| &levels.ids);
+        let others = ids.filter(|&&id| id != at && id < nodes.len());
+        claims.extend(others.map(|&id| (at, id)));
+    }
+    let all: HashSet<usize> = claims.iter().map(|&(_, id)| id).collect();
+    claims.retain(|(by, _)| !all.contains(by));
+    claims.into_iter().map(|(_, id)| id).collect()
 }
 
 /// Which of some nodes that stand beside each other are left out by their names, in their order.

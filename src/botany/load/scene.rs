@@ -26,8 +26,9 @@ pub(super) struct Placement {
 pub(super) fn placements(asset: &Asset, warnings: &mut Warnings) -> Result<Vec<Placement>> {
     let nodes = &asset.json.nodes;
     let mut seen = vec![false; nodes.len()];
-    let coarser = aside::named(nodes);
-    let roots = of_the_tree(asset, &roots(asset, warnings)?, &coarser, warnings);
+    let roots = roots(asset, warnings)?;
+    let coarser = aside::named(nodes, &roots);
+    let roots = of_the_tree(asset, &roots, &coarser, warnings);
     let root = |node| (node, DMat4::IDENTITY);
     let mut stack: Vec<(usize, DMat4)> = roots.into_iter().rev().map(root).collect();
     let mut out = Vec::new();
