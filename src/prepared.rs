@@ -100,7 +100,8 @@ impl<'t> Pieces<'t> {
             || merge(&elements, recipe.locality),
             || {
                 let wood = Wood::new(tree, true);
-                (wood, Original::new(&tree.model, views, sector, MASK_HEIGHT))
+                let original = Original::new(&tree.model, views, sector, MASK_HEIGHT);
+                (wood, original.with_tones(&tree.model))
             },
         );
         Ok(Self {

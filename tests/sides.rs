@@ -1,6 +1,9 @@
 //! Leaves with pale undersides: cards whose sides differ visibly show each side's own colours. Leaves with one side: so have
 //! cards.
 
+#[path = "support/tree.rs"]
+mod tree;
+
 use std::path::Path;
 
 use glam::Vec3;
@@ -12,9 +15,9 @@ use pleach::recipe::Recipe;
 use pleach::report::schema::Report;
 use pleach::report::{Settings, evaluate};
 use pleach::scene::Scene;
-use pleach::space::glb::GlbBuilder;
 use pleach::watch::Unwatched;
-use serde_json::json;
+
+use tree::{BARK, write_tree};
 
 /// Triangles of the level.
 const BUDGET: u64 = 200;
@@ -55,43 +58,7 @@ fn two_toned(file: &Path) {
         ("leaf", [0.0, 0.5, 0.0, 1.0], above),
         ("underside", [0.5, 0.0, 0.0, 1.0], below),
     ];
-    write_tree(file, &crown, &sheets);
-}
-
-/// Name, colour and triangles of leaves that are drawn from their front alone.
-type Sheet = (&'static str, [f32; 4], Vec<[u32; 3]>);
-
-/// A trunk 5 m high with a crown.
-fn write_tree(file: &Path, crown: &[Vec3], sheets: &[Sheet]) {
-    let mut glb = GlbBuilder::default();
-    let (mut wood, mut bark) = (Vec::new(), Vec::new());
-    for ring in 0..6u32 {
-        for side in 0..8u32 {
-            let angle = side as f32 * std::f32::consts::FRAC_PI_4;
-            wood.push(Vec3::new(angle.cos() * 0.2, ring as f32, angle.sin() * 0.2));
-            if ring > 0 {
-                let [a, b] = [side, (side + 1) % 8].map(|s| (ring - 1) * 8 + s);
-                bark.extend([[a, a + 8, b], [b, a + 8, b + 8]]);
-            }
-        }
-    }
-    let mut primitive = |points: &[Vec3], triangles: &[[u32; 3]], material: u32| {
-        let position = glb.positions(points);
-        let indices = glb.indices(triangles, points.len());
-        json!({ "attributes": { "POSITION": position }, "indices": indices, "material": material })
-    };
-    let mut primitives = vec![primitive(&wood, &bark, 0)];
-    let color = |name: &str, rgba: [f32; 4]| json!({ "name": name, "pbrMetallicRoughness": { "baseColorFactor": rgba } });
-    let mut materials = vec![color("bark", [0.3, 0.2, 0.1, 1.0])];
-    for (name, rgba, triangles) in sheets {
-        primitives.push(primitive(crown, triangles, materials.len() as u32));
-        materials.push(color(name, *rgba));
-    }
-    let root = json!({
-        "asset": { "version": "2.0" }, "scene": 0, "scenes": [{ "nodes": [0] }],
-        "nodes": [{ "mesh": 0 }], "meshes": [{ "primitives": primitives }], "materials": materials,
-    });
-    std::fs::write(file, glb.finish(root)).unwrap();
+    write_tree(file, BARK, &crown, &sheets);
 }
 
 /// The level's cards and the page that they show.
@@ -258,7 +225,12 @@ fn facing_z(file: &Path, layers: bool) {
             triangles.extend(layers.then_some([a, c, b]));
         }
     }
-    write_tree(file, &crown, &[("leaf", [0.0, 0.5, 0.0, 1.0], triangles)]);
+    write_tree(
+        file,
+        BARK,
+        &crown,
+        &[("leaf", [0.0, 0.5, 0.0, 1.0], triangles)],
+    );
 }
 
 /// The level of such a tree, beside the original.

@@ -6,20 +6,27 @@ use fixedbitset::FixedBitSet;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
+use super::mip::halve;
 use super::refine::Target;
-use crate::botany::model::{Model, Wrap};
+use crate::botany::model::{Image, Model, Wrap};
 use crate::space::directions::Direction;
 use crate::space::raster::{
-    Camera, Geometry, Mask, Material, Mips, Sampling, Scene, Texture, coverage,
+    Camera, Geometry, Mask, Material, Mips, Sampling, Scene, Texture, Tone, coverage, tones,
 };
 use crate::space::sector::{Eyes, Sector};
 use crate::space::texture::cutoff;
 
 /// One sample each: masks are fine enough.
-const SAMPLING: Sampling = Sampling {
+pub const SAMPLING: Sampling = Sampling {
     side: 1,
     mips: Mips::Base,
 };
+
+/// Height of the tree in pixels for its mean colours: one sample each.
+const TONE_HEIGHT: f32 = 384.0;
+
+/// Images are halved to this side first: a mean needs no more.
+const TONE_SIDE: u32 = 1024;
 
 /// Masks of the original from the training directions.
 pub struct Original {
@@ -27,12 +34,17 @@ pub struct Original {
     pub eyes: Eyes,
     /// The directions.
     pub directions: Vec<Direction>,
+    /// Those from which colours are compared.
+    toned: Vec<Direction>,
     /// One mask a direction, at `samples_per_unit`.
     masks: Vec<Bits>,
     /// Samples for a normalised unit.
     samples_per_unit: f32,
     /// Height of the tree in normalised units.
     pub height: f32,
+    /// Triangles that were seen, in order, and of each the pixels and the sums of the linear RGB of its base colour; empty
+    /// where that was not asked for.
+    tones: Vec<(u32, [f32; 4])>,
 }
 
 /// A mask in an eighth of its size: those of all directions wait for all levels.
@@ -86,32 +98,8 @@ pub fn camera(direction: &Direction, pixels: f32) -> Camera {
 impl Original {
     /// Renders `model` from `views` directions of a sector, the tree `height_samples` samples high.
     pub fn new(model: &Model, views: u32, sector: Sector, height_samples: f32) -> Self {
-        let textures: Vec<Texture> = model
-            .images
-            .par_iter()
-            .map(|i| {
-                let alpha = i.rgba.chunks_exact(4).map(|t| t[3]).collect();
-                Texture::from_alpha(i.width, i.height, alpha)
-            })
-            .collect();
-        let materials: Vec<Material> = model.materials.iter().map(raster_material).collect();
-        let triangle_material: Vec<u32> = model
-            .triangle_object
-            .iter()
-            .map(|&o| model.objects[o as usize].material)
-            .collect();
-        let scene = Scene {
-            geometry: Geometry {
-                positions: &model.positions,
-                normals: &[],
-                uvs: [&model.uvs[0], &model.uvs[1]],
-                colors: &model.colors,
-                triangles: &model.triangles,
-                triangle_material: &triangle_material,
-            },
-            materials: &materials,
-            textures: &textures,
-        };
+        let drawn = Drawn::silhouettes(model);
+        let scene = drawn.scene(model);
         let height = model.height().max(1e-6);
         let samples_per_unit = height_samples / height;
         let directions = sector.training(views);
@@ -126,9 +114,54 @@ impl Original {
                 .collect(),
             eyes: sector.eyes(),
             directions,
+            toned: sector.toning(),
             samples_per_unit,
             height,
+            tones: Vec::new(),
         }
+    }
+
+    /// With its colours.
+    pub fn with_tones(self, model: &Model) -> Self {
+        let drawn = Drawn::colors(model);
+        let scene = drawn.scene(model);
+        let cameras: Vec<Camera> = self.toned_from(TONE_HEIGHT / self.height).collect();
+        let seen = cameras
+            .par_iter()
+            .map(|camera| tones(&scene, camera, SAMPLING));
+        let seen: Vec<Vec<(u32, Tone)>> = seen.collect();
+        let mut all = vec![Tone::default(); model.triangles.len()];
+        for (triangle, tone) in seen.into_iter().flatten() {
+            all[triangle as usize].add(&tone);
+        }
+        let seen = (0..).zip(all).filter(|(_, tone)| tone.covered > 0.0);
+        let short = |tone: Tone| {
+            let [r, g, b] = tone.light;
+            [r, g, b, tone.covered].map(|v| v as f32)
+        };
+        let mut tones: Vec<_> = seen
+            .map(|(triangle, tone)| (triangle, short(tone)))
+            .collect();
+        tones.shrink_to_fit();
+        Self { tones, ..self }
+    }
+
+    /// What is seen of some triangles in the whole tree.
+    pub fn tone(&self, triangles: &FixedBitSet) -> Tone {
+        let some = self
+            .tones
+            .iter()
+            .filter(|(t, _)| triangles.contains(*t as usize));
+        let long = |&(_, [r, g, b, covered]): &(u32, [f32; 4])| Tone {
+            light: [r, g, b].map(f64::from),
+            covered: covered.into(),
+        };
+        some.map(long).sum()
+    }
+
+    /// From where colours are compared, at so many pixels a unit.
+    pub fn toned_from(&self, pixels: f32) -> impl Iterator<Item = Camera> + '_ {
+        self.toned.iter().map(move |d| camera(d, pixels))
     }
 
     /// Height of the tree in samples of its masks.
@@ -174,6 +207,68 @@ impl Original {
                 }
             })
             .collect()
+    }
+}
+
+/// The original for the raster.
+struct Drawn {
+    materials: Vec<Material>,
+    textures: Vec<Texture>,
+    triangle_material: Vec<u32>,
+}
+
+impl Drawn {
+    /// Images hold where they are opaque, no more.
+    fn silhouettes(model: &Model) -> Self {
+        let texture = |image: &Image| {
+            let alpha = image.rgba.chunks_exact(4).map(|t| t[3]).collect();
+            Texture::from_alpha(image.width, image.height, alpha)
+        };
+        Self::new(model, model.images.par_iter().map(texture).collect())
+    }
+
+    /// Images are as large as a mean needs them.
+    fn colors(model: &Model) -> Self {
+        let mut is_seen = vec![false; model.images.len()];
+        for base in model.materials.iter().filter_map(|m| m.base_color) {
+            is_seen[base.image as usize] = true;
+        }
+        let texture = |(image, is_seen): (&Image, bool)| {
+            if !is_seen {
+                return Texture::from_alpha(1, 1, vec![255]);
+            }
+            let mut image = image.clone();
+            while image.width.max(image.height) > TONE_SIDE {
+                halve(&mut image, true);
+            }
+            Texture::base_of_rgba(image.width, image.height, &image.rgba)
+        };
+        let images: Vec<(&Image, bool)> = model.images.iter().zip(is_seen).collect();
+        Self::new(model, images.into_par_iter().map(texture).collect())
+    }
+
+    fn new(model: &Model, textures: Vec<Texture>) -> Self {
+        let of_object = |&o: &u32| model.objects[o as usize].material;
+        Self {
+            materials: model.materials.iter().map(raster_material).collect(),
+            textures,
+            triangle_material: model.triangle_object.iter().map(of_object).collect(),
+        }
+    }
+
+    fn scene<'a>(&'a self, model: &'a Model) -> Scene<'a> {
+        Scene {
+            geometry: Geometry {
+                positions: &model.positions,
+                normals: &[],
+                uvs: [&model.uvs[0], &model.uvs[1]],
+                colors: &model.colors,
+                triangles: &model.triangles,
+                triangle_material: &self.triangle_material,
+            },
+            materials: &self.materials,
+            textures: &self.textures,
+        }
     }
 }
 

@@ -5,6 +5,7 @@ mod few;
 mod fit;
 mod share;
 mod sided;
+mod tone;
 
 use glam::Vec3;
 

@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use super::fit::{Fitted, on_page};
+use super::tone::toned;
 use super::{Baker, Level};
 use crate::error::Result;
 use crate::export::atlas::MAX_SIDE;
@@ -10,6 +11,7 @@ use crate::export::coarser::coarsen_light;
 use crate::export::foliage::material;
 use crate::export::level_scene::AreaGoal;
 use crate::export::matching::{CONTRAST_GUESS, Matched, Matching, Standing};
+use crate::export::original::Original;
 use crate::export::refine::{Target, f1, refine};
 use crate::export::share::{self, Cards, Kin, Lone, Plan, Shared, kin, lone, share};
 use crate::watch::{Watch, part};
@@ -36,7 +38,7 @@ impl Baker<'_> {
 
     /// The level on a page of its own.
     pub fn alone(&self, fitted: Fitted) -> Level {
-        let level = fitted.level(self.original, self.is_lit());
+        let level = self.toned(fitted.level(self.original, self.is_lit()));
         level.with_coarser_light(self.recipe.own_light_halvings())
     }
 
@@ -270,6 +272,9 @@ impl Page {
                 shared: Vec::new(),
             }
         };
-        guests.iter().zip(self.charts.clone()).map(level).collect()
+        let mut levels: Vec<Level> = guests.iter().zip(self.charts.clone()).map(level).collect();
+        let originals: Vec<&Original> = guests.iter().map(|g| g.baker.original).collect();
+        toned(&mut levels, &originals);
+        levels
     }
 }

@@ -10,6 +10,7 @@ use super::outline::{Outline, summary};
 use super::schema::{Appearance, Change, Figure, Jump, Orbit, SizeFigures, ViewAppearance};
 use super::stage::Actor;
 use super::stand::{Leap, OfSize, OfView, STEP_DEG, Stand};
+use crate::space::raster::Tone;
 
 /// What was found of one model.
 #[derive(Default)]
@@ -97,10 +98,8 @@ fn figures(height_px: u32, moved_f1: f64, views: &[&OfSize]) -> Option<SizeFigur
     };
     let mut client = outlines(|v| v.client.as_ref());
     if let Some(client) = &mut client {
-        let sums: Vec<[f64; 4]> = views.iter().filter_map(|v| v.base_color).collect();
-        let total = |i: usize| sums.iter().map(|s| s[i]).sum::<f64>();
-        let covered = total(3);
-        client.base_color_linear = (covered > 0.0).then(|| [0, 1, 2].map(|c| total(c) / covered));
+        let all: Tone = views.iter().filter_map(|v| v.base_color).sum();
+        client.base_color_linear = all.mean();
     }
     let looks: Vec<ViewAppearance> = views.iter().filter_map(|v| v.look.clone()).collect();
     Some(SizeFigures {

@@ -5,8 +5,8 @@ use glam::{Vec2, Vec3};
 use super::drawable::Drawable;
 use crate::botany::Model;
 use crate::space::raster::{
-    Camera, Coverage, Geometry, Layers, Light, Mask, Placement, Relief, Sampling, Scene, coverage,
-    coverage_multisampled, layers,
+    Camera, Coverage, Geometry, Layers, Mask, Placement, Relief, Sampling, Scene, Tone, coverage,
+    coverage_multisampled, layers, tone,
 };
 use crate::space::view::{Lens, View};
 
@@ -125,14 +125,10 @@ impl<'m> Actor<'m> {
         coverage_multisampled(&self.drawable.scene(), &camera.placed(self.place))
     }
 
-    /// Sums of the linear RGB of the base colour and of coverage over all pixels, without light, as
-    /// an engine draws it: one sample a pixel, mips.
-    pub fn base_color(&self, camera: &Camera) -> [f64; 4] {
-        let (scene, camera) = (self.drawable.scene(), camera.placed(self.place));
-        let (_, layers) = layers(&scene, &camera, Sampling::CLIENT, Light::Unlit, &[]);
-        let sum = |c: usize| layers.color.iter().map(|p| f64::from(p[c])).sum();
-        let covered = layers.coverage.iter().map(|&c| f64::from(c)).sum();
-        [sum(0), sum(1), sum(2), covered]
+    /// The base colour, without light, as an engine draws it: one sample a pixel, mips.
+    pub fn base_color(&self, camera: &Camera) -> Tone {
+        let camera = camera.placed(self.place);
+        tone(&self.drawable.scene(), &camera, Sampling::CLIENT)
     }
 }
 

@@ -7,7 +7,7 @@ use super::schema::ViewAppearance;
 use super::shot::Shot;
 use super::silhouette::moved_f1;
 use super::stage::{Actor, Order, Window, sampling};
-use crate::space::raster::{Camera, Mask};
+use crate::space::raster::{Camera, Mask, Tone};
 use crate::space::view::View;
 
 /// Angle between two frames of an orbit, degrees.
@@ -34,8 +34,8 @@ pub struct OfSize {
     pub moved_f1: f64,
     /// As an engine draws it.
     pub client: Option<Outline>,
-    /// Sums of [`Actor::base_color`].
-    pub base_color: Option<[f64; 4]>,
+    /// [`Actor::base_color`].
+    pub base_color: Option<Tone>,
     /// How it looks beside the original.
     pub look: Option<ViewAppearance>,
 }
@@ -208,7 +208,7 @@ impl<'a> Stand<'a> {
         })
     }
 
-    fn base_color(&self, actor: usize, camera: &Camera) -> Option<[f64; 4]> {
+    fn base_color(&self, actor: usize, camera: &Camera) -> Option<Tone> {
         let asked = self.asked.base_colors;
         asked.then(|| self.actors[actor].base_color(camera))
     }

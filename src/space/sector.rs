@@ -8,6 +8,8 @@ use super::directions::{Direction, direction, training};
 const STEP_DEG: f32 = 5.0;
 /// Elevation from which a view counts as one from the top, degrees.
 const TOP_DEG: f32 = 75.0;
+/// Directions from which colours are compared.
+const TONING: u32 = 12;
 /// Fractions of the plastic number (Roberts 2018): points of this sequence leave no gaps in a rectangle.
 const SPREAD: [f32; 2] = [0.754_877_7, 0.569_840_3];
 
@@ -73,6 +75,20 @@ impl Sector {
             direction(self.azimuth_deg(share(0)), self.elevation_deg(share(1)))
         };
         (0..count).map(at).collect()
+    }
+
+    /// Directions from which colours are compared: those of a quarter turn are the same again where the tree is seen
+    /// from everywhere, so that its colours do not depend on how it is turned.
+    pub fn toning(&self) -> Vec<Direction> {
+        const QUARTERS: [f32; 4] = [0.0, 90.0, 180.0, 270.0];
+        if !self.is_whole() {
+            return self.training(TONING);
+        }
+        let ring = |(azimuth, elevation): (f32, f32)| {
+            QUARTERS.map(|quarter| direction(azimuth + quarter, elevation))
+        };
+        let rings = [(15.0, 0.0), (45.0, 30.0), (75.0, -15.0)].map(ring);
+        rings.as_flattened().to_vec()
     }
 
     /// Where its eyes are, for who asks of many planes.

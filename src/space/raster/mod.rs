@@ -38,6 +38,7 @@ mod shade;
 mod shader;
 mod srgb;
 mod texture;
+mod tone;
 mod triangle;
 
 pub use camera::{Camera, Placement};
@@ -53,6 +54,7 @@ pub use relief::Relief;
 pub use shade::Light;
 pub use srgb::{linear_from_srgb, srgb_from_linear};
 pub use texture::Texture;
+pub use tone::{Tone, tone, tones};
 
 use glam::{Vec2, Vec3};
 

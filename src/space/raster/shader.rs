@@ -18,6 +18,8 @@ const KNOWN: usize = 256;
 
 /// What is seen at a sample.
 pub(super) struct Shaded {
+    /// Place of the triangle in the pane's list.
+    pub item: u32,
     /// Linear.
     pub light: [f32; 3],
     pub normal: Vec3,
@@ -187,6 +189,7 @@ impl<'a> Shader<'a> {
         }
         let lit = self.light.on(normal);
         let seen = Shaded {
+            item,
             light: albedo.map(|c| c * lit),
             normal,
             near,

@@ -19,11 +19,20 @@ impl Texture {
     /// # Panics
     /// If `rgba` is not `width * height * 4` bytes long, or the image is empty.
     pub fn from_rgba(width: u32, height: u32, rgba: &[u8]) -> Self {
-        assert_eq!(rgba.len(), width as usize * height as usize * 4);
-        let (texels, _) = rgba.as_chunks::<4>();
-        let alpha = texels.iter().map(|t| t[3]).collect();
-        let rgb = texels.iter().map(|t| [t[0], t[1], t[2]]).collect();
+        let (alpha, rgb) = parted(width, height, rgba);
         Self::new(width, height, alpha, rgb)
+    }
+
+    /// As [`Texture::from_rgba`], the base level alone: it is read from any distance.
+    ///
+    /// # Panics
+    /// If `rgba` is not `width * height * 4` bytes long, or the image is empty.
+    pub fn base_of_rgba(width: u32, height: u32, rgba: &[u8]) -> Self {
+        let (alpha, rgb) = parted(width, height, rgba);
+        assert!(!alpha.is_empty());
+        Self {
+            levels: vec![Level::new(width, height, alpha, rgb)],
+        }
     }
 
     /// Alpha alone: enough for [`coverage`](super::coverage), a quarter of the work.
@@ -92,6 +101,15 @@ impl Texture {
             coarser: (part > 0.0).then(|| (&self.levels[low + 1], part)),
         }
     }
+}
+
+/// Alpha and colours.
+fn parted(width: u32, height: u32, rgba: &[u8]) -> (Vec<u8>, Vec<[u8; 3]>) {
+    assert_eq!(rgba.len(), width as usize * height as usize * 4);
+    let (texels, _) = rgba.as_chunks::<4>();
+    let alpha = texels.iter().map(|t| t[3]).collect();
+    let rgb = texels.iter().map(|t| [t[0], t[1], t[2]]).collect();
+    (alpha, rgb)
 }
 
 /// A texture at one level of detail.
