@@ -3,6 +3,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
+use fixedbitset::FixedBitSet;
 use glam::Vec2;
 use rayon::prelude::*;
 
@@ -45,7 +46,7 @@ pub struct Foliage {
     /// The page, row by row; colours and normals are already bled into empty texels.
     pub texels: Texels,
     /// Whether the texel belongs to a chart.
-    pub owned: Vec<bool>,
+    pub owned: FixedBitSet,
     /// Whether cards are seen from their front alone.
     pub one_sided: bool,
     /// Final alpha of each texel; set from coverage by [`Foliage::threshold`] or by matching.
@@ -72,7 +73,7 @@ impl Foliage {
     pub(super) fn of(charts: Vec<Chart>, size: [u32; 2]) -> Self {
         let count = (size[0] * size[1]) as usize;
         Self {
-            owned: vec![false; count],
+            owned: FixedBitSet::with_capacity(count),
             alpha: vec![0; count],
             charts,
             backs: Vec::new(),
@@ -105,7 +106,7 @@ impl Foliage {
             for (chart, texels) in projected {
                 for (local, at) in placed_texels(chart, width) {
                     self.texels.set(at, texels[local]);
-                    self.owned[at] = true;
+                    self.owned.insert(at);
                 }
             }
         }
@@ -170,7 +171,7 @@ impl Foliage {
                     }
                     false => 0,
                 };
-                self.owned[at] = true;
+                self.owned.insert(at);
             }
             front.lift(0.5 * gap);
             back.lift(0.5 * gap);

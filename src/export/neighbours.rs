@@ -3,6 +3,7 @@
 //! Where all views see other things in front of a texel it has no vote, and a threshold could take only
 //! all of these or none.
 
+use fixedbitset::FixedBitSet;
 use rayon::prelude::*;
 
 /// Share of its neighbours' mean that a texel takes over.
@@ -15,7 +16,7 @@ const PASSES: u32 = 3;
 const BAND: usize = 64;
 
 /// Moves the score of every `owned` texel of a page a little towards the mean of those around it.
-pub fn follow_neighbours(score: &mut [f32], owned: &[bool], width: usize) {
+pub fn follow_neighbours(score: &mut [f32], owned: &FixedBitSet, width: usize) {
     for _ in 0..PASSES {
         // A band's rows are changed in place; what must be kept as it was are the rows beside bands.
         let ends = |band: &[f32]| [band[..width].to_vec(), band[band.len() - width..].to_vec()];
@@ -34,10 +35,9 @@ pub fn follow_neighbours(score: &mut [f32], owned: &[bool], width: usize) {
 fn in_band(
     band: &mut [f32],
     beside: [Option<&[f32]>; 2],
-    owned: &[bool],
+    owned: &FixedBitSet,
     (first_row, width): (usize, usize),
 ) {
-    let owned = |y: usize| &owned[y * width..][..width];
     let mut above = beside[0].map(<[f32]>::to_vec);
     for y in 0..band.len() / width {
         let (changed, rest) = band.split_at_mut((y + 1) * width);
@@ -50,17 +50,17 @@ fn in_band(
         let at = first_row + y;
         let rows = [above.as_deref(), Some(&here), below];
         // Row `i` of these is row `at + i - 1` of the page.
-        let near = (0..3).filter_map(|i| Some((rows[i]?, owned(at + i - 1))));
-        let near: Vec<(&[f32], &[bool])> = near.collect();
+        let near = (0..3).filter_map(|i| Some((rows[i]?, (at + i - 1) * width)));
+        let near: Vec<(&[f32], usize)> = near.collect();
         for (x, value) in row.iter_mut().enumerate() {
-            if !owned(at)[x] {
+            if !owned[at * width + x] {
                 continue;
             }
             let columns = x.saturating_sub(1)..(x + 2).min(width);
             let cells = near
                 .iter()
-                .flat_map(|(row, owned)| columns.clone().map(move |u| (row[u], owned[u])));
-            let cells = cells.filter(|(_, owned)| *owned);
+                .flat_map(|&(row, first)| columns.clone().map(move |u| (row[u], first + u)));
+            let cells = cells.filter(|&(_, at)| owned[at]);
             let (sum, count) = cells.fold((0.0, 0.0), |(s, n), (v, _)| (s + v, n + 1.0));
             *value += NEIGHBOURS / PASSES as f32 * (sum / count - *value);
         }
@@ -76,7 +76,7 @@ mod tests {
     fn a_texel_takes_over_a_thirtieth_of_the_mean_at_a_time() {
         // One row; the last texel is nobody's, and counts for nothing.
         let mut score = [0.0, 1.0, 0.0, 9.0];
-        let owned = [true, true, true, false];
+        let owned = FixedBitSet::from_iter([0, 1, 2]);
         follow_neighbours(&mut score, &owned, 4);
         let mut wanted = [0.0f32, 1.0, 0.0];
         for _ in 0..3 {
@@ -106,7 +106,8 @@ mod tests {
             score[y * width..][..width].fill(3.0);
         }
         let before = score.clone();
-        follow_neighbours(&mut score, &vec![true; width * height], width);
+        let owned = FixedBitSet::from_iter(0..width * height);
+        follow_neighbours(&mut score, &owned, width);
         let row = |y: usize| &score[y * width..][..width];
         for off in 0..4 {
             assert_eq!(row(stripes[0] + off), row(stripes[1] + off));

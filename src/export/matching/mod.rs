@@ -131,7 +131,7 @@ mod tests {
                 f32::from(u8::from(on)) + 0.001 * (i * 7919 % 97) as f32
             })
             .collect();
-        let owned = foliage.owned.iter().filter(|&&o| o).count();
+        let owned = foliage.owned.count_ones(..);
         // The gutter around the card is owned too: the card's own share is that of all.
         (foliage, score, f64::from(wanted) / owned as f64)
     }

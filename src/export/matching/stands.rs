@@ -42,8 +42,8 @@ pub(super) struct Stands<'a> {
 impl<'a> Stands<'a> {
     /// Draws the wood; texels of no chart score nothing.
     pub fn new(foliage: &Foliage, mut score: Vec<f32>, trees: &[Standing<'a>]) -> Self {
-        for (score, _) in score.iter_mut().zip(&foliage.owned).filter(|(_, o)| !**o) {
-            *score = f32::NEG_INFINITY;
+        for nobodys in foliage.owned.zeroes() {
+            score[nobodys] = f32::NEG_INFINITY;
         }
         let [width, height] = foliage.size;
         let stand = |tree: &Standing<'a>| {
