@@ -1,8 +1,12 @@
 //! What recognition knows of a model: its parts, organs, leaves, skeleton and sub-trees.
 
 use glam::Vec3;
+use smallvec::SmallVec;
 
 use super::model::Model;
+
+/// Triangles of which there are few, as most leaves have: up to four take no allocation of their own.
+pub type Few = SmallVec<[u32; 4]>;
 
 /// A model with its botany. All lengths are in normalised units (bounding-sphere radius one).
 #[derive(Clone, Debug, Default)]
@@ -46,7 +50,7 @@ pub enum Organ {
 #[derive(Clone, Debug, Default)]
 pub struct Leaf {
     /// Its triangles.
-    pub triangles: Vec<u32>,
+    pub triangles: Few,
     /// Its class of congruence.
     pub class: u32,
     /// Area-weighted centre of mass.

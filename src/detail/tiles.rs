@@ -119,7 +119,7 @@ impl<'t> Builder<'t> {
             }
         }
         for (leaf, subtree) in tree.leaves.iter().zip(of_leaf) {
-            out.add(subtree, leaf.triangles.clone(), 1);
+            out.add(subtree, leaf.triangles.to_vec(), 1);
         }
         for (chain, triangles) in wood_by_chain(tree).into_iter().enumerate() {
             out.add(of_chain[chain], triangles, 0);
@@ -307,6 +307,7 @@ mod tests {
     use crate::botany::grow::{Options, Species, grow};
     use crate::botany::load::{Limits, load_slice};
     use crate::botany::recognise::{RecogniseOptions, recognise};
+    use crate::botany::tree::Few;
 
     fn grown(species: &str, leaves: u32) -> Tree {
         let options = Options {
@@ -410,7 +411,7 @@ mod tests {
             tree.organ.push(Organ::Foliage);
             tree.wood_node.push(NO_NODE);
             tree.leaves.push(crate::botany::tree::Leaf {
-                triangles: vec![i],
+                triangles: Few::from_slice(&[i]),
                 ..Default::default()
             });
             tree.subtrees.push(crate::botany::tree::Subtree {

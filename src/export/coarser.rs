@@ -12,15 +12,17 @@ use rayon::prelude::*;
 
 use crate::botany::model::Image;
 
-/// Halves each side of the maps of light of a page (base colour, normals, others; or base colour alone)
-/// so many times. Where they may be coarser at all, a map that is the same everywhere is one texel.
+/// Halves each side of the maps of light of a page (base colour, normals, others; as many as it has) so many times. Where they may be coarser at all, a map that is the same everywhere is one texel.
 pub fn coarsen_light(page: &mut [Image], halvings: u32) {
     if halvings > 0 {
         page.iter_mut().skip(1).for_each(shrink_if_same);
     }
-    if let [_, normals, others] = page {
-        for _ in 0..halvings {
-            (*normals, *others) = (halved_normals(normals), halved(others));
+    for _ in 0..halvings {
+        for (number, map) in page.iter_mut().enumerate().skip(1) {
+            *map = match number {
+                1 => halved_normals(map),
+                _ => halved(map),
+            };
         }
     }
 }
@@ -165,6 +167,10 @@ mod tests {
         let mut unlit = [page[0].clone()];
         coarsen_light(&mut unlit, 2);
         assert_eq!(unlit[0].width, 8);
+        let [color, normals, _] = page;
+        let mut even = [color, normals];
+        coarsen_light(&mut even, 2);
+        assert_eq!(even.map(|i| [i.width, i.height]), [[8, 4], [2, 1]]);
     }
 
     #[test]

@@ -9,10 +9,11 @@ use rayon::prelude::*;
 
 use super::atlas::{Layout, lay_out};
 use super::chart::{Chart, Shape};
+use super::maps::Maps;
 use super::project::project;
 use super::surface::Surface;
 use super::texel::{Stored, Texels};
-use crate::botany::model::{AlphaMode, Image, Material, Model, TextureRef, Wrap};
+use crate::botany::model::{Image, Model};
 use crate::cloud::card::Card;
 
 /// A card and the triangles of the model that it shows.
@@ -47,6 +48,8 @@ pub struct Foliage {
     pub texels: Texels,
     /// Whether the texel belongs to a chart.
     pub owned: FixedBitSet,
+    /// What its images are of.
+    pub maps: Maps,
     /// Whether cards are seen from their front alone.
     pub one_sided: bool,
     /// Final alpha of each texel; set from coverage by [`Foliage::threshold`] or by matching.
@@ -62,7 +65,7 @@ impl Foliage {
         let cards: Vec<&Card> = groups.iter().map(|g| &g.card).collect();
         let (mut charts, size) = lay_out(&cards, sided, options.layout);
         let backs = charts.split_off(groups.len());
-        let mut foliage = Self::of(charts, size);
+        let mut foliage = Self::of(charts, size, Maps::of(model));
         foliage.project(0, model, groups, options.samples);
         foliage.project_backs(model, groups, options.samples, sided, backs);
         foliage.threshold(0.5, 0);
@@ -70,16 +73,17 @@ impl Foliage {
     }
 
     /// An empty page for `charts`.
-    pub(super) fn of(charts: Vec<Chart>, size: [u32; 2]) -> Self {
+    pub(super) fn of(charts: Vec<Chart>, size: [u32; 2], maps: Maps) -> Self {
         let count = (size[0] * size[1]) as usize;
         Self {
             owned: FixedBitSet::with_capacity(count),
             alpha: vec![0; count],
             charts,
             backs: Vec::new(),
+            maps,
             one_sided: false,
             size,
-            texels: Texels::empty(count),
+            texels: Texels::empty(count, maps),
         }
     }
 
@@ -145,6 +149,7 @@ impl Foliage {
             size: self.size,
             texels: Texels::default(),
             owned: self.owned.clone(),
+            maps: self.maps,
             one_sided: self.one_sided,
             alpha: self.alpha.clone(),
         }
@@ -213,9 +218,8 @@ impl Foliage {
         out
     }
 
-    /// Base colour with alpha; where light is to fall on it, tangent-space normals and
-    /// occlusion-roughness-metalness, too. They are what the texels were: these are no more.
-    pub fn take_images(&mut self, lit: bool) -> Vec<Image> {
+    /// The images that [`Maps`] names. They are what the texels were: these are no more.
+    pub fn take_images(&mut self) -> Vec<Image> {
         let mut texels = std::mem::take(&mut self.texels);
         let page = |(number, name): (usize, &&str)| {
             let rgba = match number {
@@ -230,7 +234,7 @@ impl Foliage {
                 rgba: Arc::new(rgba),
             }
         };
-        names(lit).iter().enumerate().map(page).collect()
+        self.maps.names().iter().enumerate().map(page).collect()
     }
 }
 
@@ -241,42 +245,4 @@ fn placed_texels(chart: &Chart, width: u32) -> impl Iterator<Item = (usize, usiz
         let [ax, ay] = chart.in_atlas(x, y);
         ((y * chart.size[0] + x) as usize, (ay * width + ax) as usize)
     })
-}
-
-/// Names of the images of [`Foliage::take_images`].
-const IMAGES: [&str; 3] = ["foliage_base_color", "foliage_normal", "foliage_orm"];
-
-/// Those of them that a page has.
-pub fn names(lit: bool) -> &'static [&'static str] {
-    &IMAGES[..if lit { 3 } else { 1 }]
-}
-
-/// Where the images of the page of a level with cards begin: they are its last.
-pub fn first_of_page(images: &[Image]) -> Option<usize> {
-    images.iter().rposition(|image| image.name == IMAGES[0])
-}
-
-/// The material of the cards; its images are numbered from `first_image`.
-pub fn material(first_image: u32, lit: bool, double_sided: bool) -> Material {
-    let texture = |k: u32| {
-        Some(TextureRef {
-            image: first_image + k,
-            uv_set: 0,
-            wrap: [Wrap::Clamp; 2],
-            linear: true,
-        })
-    };
-    let light = |k: u32| texture(k).filter(|_| lit);
-    Material {
-        name: "foliage".into(),
-        base_color: texture(0),
-        normal: light(1),
-        metallic_roughness: light(2),
-        occlusion: light(2),
-        unlit: !lit,
-        alpha_mode: AlphaMode::Mask,
-        alpha_cutoff: 0.5,
-        double_sided,
-        ..Material::default()
-    }
 }

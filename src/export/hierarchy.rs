@@ -12,8 +12,8 @@ use glam::Vec2;
 use serde_json::Value;
 
 use super::blocks;
-use super::foliage;
 use super::gltf::{FileBuilder, write_glb};
+use super::maps::Maps;
 use super::png::encode_images;
 use super::surface::{Scene, Surface, scene_of_groups};
 use crate::botany::model::{Frame, Image, Model};
@@ -103,7 +103,7 @@ pub fn write_hierarchy(
     page: [u32; 2],
 ) -> Result<Vec<u8>> {
     let mut file = FileBuilder::default();
-    let billboards = add_billboards(&mut file, tiles, places, page, !model.is_unlit())?;
+    let billboards = add_billboards(&mut file, tiles, places, page, Maps::of(model))?;
     let numbers = file.materials(&tips.scene, &tips.pngs);
     let mut geometry = Vec::with_capacity(tips.tiles.len());
     for (tile, surfaces) in tips.each() {
@@ -123,9 +123,9 @@ fn add_billboards(
     tiles: &[TileFiles],
     places: &[[u32; 4]],
     page: [u32; 2],
-    lit: bool,
+    maps: Maps,
 ) -> Result<Vec<usize>> {
-    let names = foliage::names(lit);
+    let names = maps.names();
     let mut texels = vec![vec![0; page[0] as usize * page[1] as usize * 4]; names.len()];
     let mut nodes = Vec::new();
     let mut scenes = Vec::new();
@@ -152,7 +152,7 @@ fn add_billboards(
         scenes.push((tile, scene, w > 0));
     }
     let page_scene = Scene {
-        materials: vec![foliage::material(0, lit, true)],
+        materials: vec![maps.material(0, true)],
         images: names
             .iter()
             .zip(texels)

@@ -19,6 +19,7 @@ pub mod manifest;
 mod manifest_check;
 mod manifest_cuts;
 pub mod manifest_tiles;
+pub mod maps;
 pub mod matching;
 pub mod mip;
 mod neighbours;

@@ -10,7 +10,7 @@ use dds::header::{AlphaMode, Dx10Header, DxgiFormat, Header};
 use dds::{ColorFormat, Encoder, Format, ImageView, Size};
 
 use super::coarser::{halved, halved_normals};
-use super::foliage::first_of_page;
+use super::maps::first_of_page;
 use super::mip::halve;
 use super::surface::Scene;
 use crate::botany::model::{AlphaMode as Tested, Image};

@@ -6,6 +6,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::edge::{bleed, nearest};
+use super::maps::Maps;
 use super::project::Texel;
 use crate::space::texture::{linear, srgb};
 
@@ -53,7 +54,7 @@ impl Stored {
 }
 
 /// The texels of a page, a plane for each of the images that come of them: what is stored becomes pixels in place,
-/// so that a page and its images are never in memory side by side.
+/// so that a page and its images are never in memory side by side. What comes into no image is forgotten.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Texels {
     /// sRGB and coverage.
@@ -66,11 +67,15 @@ pub struct Texels {
 
 impl Texels {
     /// So many of nothing.
-    pub fn empty(count: usize) -> Self {
+    pub fn empty(count: usize, maps: Maps) -> Self {
+        let plane = |number: usize| match number < maps.count() {
+            true => vec![[0; 4]; count],
+            false => Vec::new(),
+        };
         Self {
-            color: vec![[0; 4]; count],
-            normal: vec![[0; 4]; count],
-            orm: vec![[0; 4]; count],
+            color: plane(0),
+            normal: plane(1),
+            orm: plane(2),
         }
     }
 
@@ -89,8 +94,8 @@ impl Texels {
         let [r, g, b, coverage] = self.color[at];
         Stored {
             color: [r, g, b],
-            normal: normal_bytes_in(self.normal[at]),
-            orm: first_three(self.orm[at]),
+            normal: self.normal.get(at).map_or([0; 3], |&n| normal_bytes_in(n)),
+            orm: self.orm.get(at).map_or([0; 3], |&o| first_three(o)),
             coverage,
         }
     }
@@ -99,8 +104,12 @@ impl Texels {
     pub fn set(&mut self, at: usize, texel: Stored) {
         let [r, g, b] = texel.color;
         self.color[at] = [r, g, b, texel.coverage];
-        put(&mut self.normal[at], texel.normal.map(i8::cast_unsigned));
-        put(&mut self.orm[at], texel.orm);
+        if let Some(normal) = self.normal.get_mut(at) {
+            put(normal, texel.normal.map(i8::cast_unsigned));
+        }
+        if let Some(orm) = self.orm.get_mut(at) {
+            put(orm, texel.orm);
+        }
     }
 
     /// Covered share of one, 0 to 1.
@@ -125,14 +134,18 @@ impl Texels {
             let normal = normal_of(normal_bytes_in(texel));
             (normal, share_of(colors[at]))
         };
-        bleed(&mut self.normal, size, normal, |texel, normal| {
-            put(texel, normal_bytes(normal).map(i8::cast_unsigned));
-        });
+        if !self.normal.is_empty() {
+            bleed(&mut self.normal, size, normal, |texel, normal| {
+                put(texel, normal_bytes(normal).map(i8::cast_unsigned));
+            });
+        }
         let orm = |at: usize, &texel: &[u8; 4]| {
             let orm = orm_of(first_three(texel));
             (orm, share_of(colors[at]))
         };
-        bleed(&mut self.orm, size, orm, |texel, o| put(texel, bytes(o)));
+        if !self.orm.is_empty() {
+            bleed(&mut self.orm, size, orm, |texel, o| put(texel, bytes(o)));
+        }
         let color = |_, &texel: &[u8; 4]| (color_of(first_three(texel)), share_of(texel));
         bleed(&mut self.color, size, color, |texel, color| {
             put(texel, color_bytes(color));
@@ -239,7 +252,7 @@ mod tests {
 
     #[test]
     fn what_is_stored_is_within_half_a_step() {
-        let (texel, mut all) = (texel(), Texels::empty(3));
+        let (texel, mut all) = (texel(), Texels::empty(3, Maps::All));
         all.set(1, texel.into());
         let stored = all.at(1);
         assert!((stored.coverage() - texel.coverage).abs() <= 0.5 / 255.0);
@@ -261,7 +274,7 @@ mod tests {
 
     #[test]
     fn images_hold_what_was_stored_and_each_takes_its_plane_along() {
-        let mut all = Texels::empty(2);
+        let mut all = Texels::empty(2, Maps::All);
         all.set(1, texel().into());
         let green = srgb(0.001_23);
         assert_eq!(all.take_colors(&[7, 9]), [0, 0, 0, 7, 0, green, 255, 9]);
@@ -273,8 +286,20 @@ mod tests {
     }
 
     #[test]
+    fn what_comes_into_no_image_is_forgotten() {
+        let mut all = Texels::empty(4, Maps::Unlit);
+        all.set(2, texel().into());
+        all.bleed([2, 2]);
+        let own = all.at(2);
+        assert_eq!((own.normal, own.orm), ([0; 3], [0; 3]));
+        assert_eq!(own.color, Stored::from(texel()).color);
+        assert!(all.take_normals().is_empty() && all.take_orms().is_empty());
+        assert_eq!(all.take_colors(&[255; 4]).len(), 16);
+    }
+
+    #[test]
     fn empty_texels_take_what_is_beside_them() {
-        let mut all = Texels::empty(4);
+        let mut all = Texels::empty(4, Maps::All);
         all.set(2, texel().into());
         all.bleed([2, 2]);
         let (own, taken) = (all.at(2), all.at(1));

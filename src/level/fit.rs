@@ -10,7 +10,7 @@ use crate::detail::level::LevelPlan;
 use crate::error::Result;
 use crate::export::atlas::Layout;
 use crate::export::enough::enough;
-use crate::export::foliage::{self, BakeOptions, Foliage};
+use crate::export::foliage::{BakeOptions, Foliage};
 use crate::export::level_scene::{AreaGoal, LevelScene, Sight};
 use crate::export::matching::{CONTRAST_GUESS, Matched, Matching, Standing};
 use crate::export::original::{Original, camera};
@@ -267,13 +267,14 @@ impl Fitted {
     }
 
     /// Bleeds the texels and joins wood and cards.
-    pub(super) fn level(mut self, original: &Original, lit: bool) -> Level {
+    pub(super) fn level(mut self, original: &Original) -> Level {
         self.foliage.add_backs(gap(original, self.request));
         self.foliage.bleed();
         let surface = self.foliage.surface(0..self.foliage.charts.len());
-        let material = |first: u32| foliage::material(first, lit, !self.plan.one_sided);
+        let (maps, double_sided) = (self.foliage.maps, !self.plan.one_sided);
+        let material = |first: u32| maps.material(first, double_sided);
         Level {
-            scene: on_page(self.wood, surface, self.foliage.take_images(lit), material),
+            scene: on_page(self.wood, surface, self.foliage.take_images(), material),
             request: self.request,
             plan: self.plan,
             matched: self.matched,

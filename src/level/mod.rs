@@ -27,7 +27,7 @@ use crate::detail::wood::{Wood, WoodOption};
 use crate::error::Result;
 use crate::export::chart::Chart;
 use crate::export::coarser::coarsen_light;
-use crate::export::foliage::first_of_page;
+use crate::export::maps::first_of_page;
 use crate::export::matching::Matched;
 use crate::export::original::Original;
 use crate::export::surface::{Scene, scene_of_model};
@@ -224,11 +224,6 @@ impl Baker<'_> {
         let other = self.fit(plan, request, watch)?;
         let better = other.least_view(self.original) > least;
         Ok(Some(if better { other } else { made }))
-    }
-
-    /// Whether light falls on the tree.
-    pub fn is_lit(&self) -> bool {
-        !self.tree.model.is_unlit()
     }
 
     /// The level of a tree that fits into its budget as it is: nothing is nearer.

@@ -8,7 +8,6 @@ use super::{Baker, Level};
 use crate::error::Result;
 use crate::export::atlas::MAX_SIDE;
 use crate::export::coarser::coarsen_light;
-use crate::export::foliage::material;
 use crate::export::level_scene::AreaGoal;
 use crate::export::matching::{CONTRAST_GUESS, Matched, Matching, Standing};
 use crate::export::original::Original;
@@ -38,7 +37,7 @@ impl Baker<'_> {
 
     /// The level on a page of its own.
     pub fn alone(&self, fitted: Fitted) -> Level {
-        let level = self.toned(fitted.level(self.original, self.is_lit()));
+        let level = self.toned(fitted.level(self.original));
         level.with_coarser_light(self.recipe.own_light_halvings())
     }
 
@@ -245,8 +244,7 @@ impl Page {
     /// A level for each guest, all with the same images: maps of light are coarser.
     pub fn levels(mut self, guests: &[Guest]) -> Vec<Level> {
         self.shared.foliage.bleed();
-        let lit = guests.iter().any(|guest| guest.baker.is_lit());
-        let mut images = self.shared.foliage.take_images(lit);
+        let mut images = self.shared.foliage.take_images();
         let halvings = guests
             .iter()
             .map(|g| g.baker.recipe.shared_light_halvings());
@@ -256,7 +254,7 @@ impl Page {
             finer,
             farthest,
         } = &self.shared;
-        let material = |first: u32| material(first, lit, true);
+        let material = |first: u32| foliage.maps.material(first, true);
         let level = |(guest, charts): (&Guest, Range<usize>)| {
             let fitted = guest.fitted;
             let surface = foliage.surface(charts.clone());

@@ -96,6 +96,7 @@ mod tests {
 
     use super::super::places::Spot;
     use super::*;
+    use crate::export::maps::Maps;
     use crate::runtime::Cells;
     use crate::scene::Scene;
 
@@ -113,7 +114,7 @@ mod tests {
             texture_bytes: 0,
             file_bytes: 0,
             paints: Default::default(),
-            is_unlit: false,
+            maps: Maps::All,
             atlas: String::new(),
             height_m: 10.0,
             center: DVec3::ZERO,

@@ -86,6 +86,7 @@ mod tests {
 
     use super::super::places::Spot;
     use super::*;
+    use crate::export::maps::Maps;
 
     /// A row of trees 5 m apart that goes away from the eye; each is a solid block.
     fn row(count: usize, solidity: f32) -> Kind {
@@ -105,7 +106,7 @@ mod tests {
             texture_bytes: 0,
             file_bytes: 0,
             paints: Default::default(),
-            is_unlit: false,
+            maps: Maps::All,
             atlas: String::new(),
             height_m: 6.0,
             center: DVec3::Y * 3.0,

@@ -10,6 +10,7 @@ use super::spec::{Spec, Species};
 use crate::botany::load::load;
 use crate::botany::model::{Material, Model};
 use crate::error::{Error, Result};
+use crate::export::maps::Maps;
 use crate::ladder::{LEAST_TRIANGLES, Rung, Wanted, rungs};
 use crate::level::LevelRequest;
 use crate::recipe::Method;
@@ -34,8 +35,8 @@ pub struct Kind {
     pub file_bytes: u64,
     /// What it is painted with: each material's colour and image.
     pub paints: BTreeSet<String>,
-    /// Whether no light falls on it.
-    pub is_unlit: bool,
+    /// What the pages of its cards have images of.
+    pub maps: Maps,
     /// The atlas that the plan says it shares; empty: none.
     pub atlas: String,
     /// Height, metres.
@@ -105,7 +106,7 @@ impl Kind {
             texture_bytes: texture_bytes(&model),
             file_bytes: model.file_bytes,
             paints: paints(&model),
-            is_unlit: model.is_unlit(),
+            maps: Maps::of(&model),
             atlas: species.atlas.clone(),
             height_m: f64::from(model.height()) * model.frame.radius,
             center: model.frame.center,

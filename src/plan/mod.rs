@@ -20,7 +20,7 @@ use std::path::Path;
 use rayon::prelude::*;
 
 use crate::error::{Error, Result};
-use crate::export::foliage::names;
+use crate::export::maps::Maps;
 use crate::recipe::Recipe;
 use crate::runtime::Cells;
 use crate::scene::{Mips, Scene};
@@ -181,7 +181,10 @@ fn species(
     let mut from = Seen::default();
     frames.iter().for_each(|f| from.join(&f.seen[index]));
     let sector = from.sector();
-    let maps = names(spec.scene.lit && !kind.is_unlit).len();
+    let maps = match spec.scene.lit {
+        true => kind.maps.count(),
+        false => Maps::Unlit.count(),
+    };
     // Maps of light are coarser where the recipe says so.
     let light = 0.25f64.powi(recipe.own_light_halvings() as i32);
     let maps_of_page = 1.0 + (maps - 1) as f64 * light;

@@ -27,6 +27,7 @@ mod window;
 
 use super::chart::Chart;
 use super::foliage::Foliage;
+use super::maps::Maps;
 
 pub use cards::Cards;
 use copies::{Copy, copies};
@@ -78,7 +79,9 @@ fn drawn_on(plan: &Plan, copies: Vec<Copy>, trees: &[Cards]) -> Shared {
     let mut numbered: Vec<(u32, Chart)> = kept.chain(copies).collect();
     numbered.sort_by_key(|&(i, _)| i);
     let charts = numbered.into_iter().map(|(_, chart)| chart).collect();
-    let mut foliage = Foliage::of(charts, plan.size);
+    let maps = trees.iter().map(|cards| Maps::of(cards.model));
+    let maps = maps.reduce(Maps::with).unwrap_or_default();
+    let mut foliage = Foliage::of(charts, plan.size, maps);
     let mut start = 0;
     for cards in trees {
         foliage.project(start, cards.model, cards.groups, cards.samples);
