@@ -17,6 +17,11 @@ pub enum Maps {
         /// glTF's metallicFactor.
         metalness: f32,
     },
+    /// These and an image in which roughness alone differs: materials have no image of the rest.
+    Rough {
+        /// glTF's metallicFactor.
+        metalness: f32,
+    },
     /// These and occlusion, roughness and metalness.
     #[default]
     All,
@@ -36,9 +41,18 @@ impl Maps {
 
     /// What cards of two kinds need on one page.
     pub fn with(self, other: Self) -> Self {
-        match self == other {
-            true => self,
-            false => Self::All,
+        match (self.metalness(), other.metalness()) {
+            _ if self == other => self,
+            (Some(metalness), Some(others)) if metalness == others => Self::Rough { metalness },
+            _ => Self::All,
+        }
+    }
+
+    /// Metalness, where it is the same everywhere and nothing occludes.
+    fn metalness(self) -> Option<f32> {
+        match self {
+            Self::Even { metalness, .. } | Self::Rough { metalness } => Some(metalness),
+            Self::Unlit | Self::All => None,
         }
     }
 
@@ -52,7 +66,7 @@ impl Maps {
         match self {
             Self::Unlit => 1,
             Self::Even { .. } => 2,
-            Self::All => 3,
+            Self::Rough { .. } | Self::All => 3,
         }
     }
 
@@ -148,7 +162,8 @@ mod tests {
         tree.materials.push(plain(0.5));
         assert_eq!(Maps::of(&tree), maps);
         tree.objects[1].material = 2;
-        assert_eq!(Maps::of(&tree), Maps::All);
+        assert_eq!(Maps::of(&tree), Maps::Rough { metalness: 0.0 });
+        assert_eq!(Maps::of(&tree).names()[2], "foliage_orm");
         tree.objects[1].material = 1;
         tree.materials[0].occlusion = material.normal;
         assert_eq!(Maps::of(&tree), Maps::All);
@@ -162,7 +177,11 @@ mod tests {
     fn trees_on_one_page_need_what_differs_between_them() {
         let [rough, smooth] = [0.9, 0.5].map(|r| Maps::of(&model(vec![plain(r)])));
         assert_eq!(rough.with(rough), rough);
-        assert_eq!(rough.with(smooth), Maps::All);
+        let both = rough.with(smooth);
+        assert_eq!(both, Maps::Rough { metalness: 0.0 });
+        assert_eq!([both.with(rough), smooth.with(both)], [both; 2]);
+        let metal = Maps::Rough { metalness: 1.0 };
+        assert_eq!([both.with(metal), rough.with(metal)], [Maps::All; 2]);
         let unlit = Material {
             unlit: true,
             ..plain(0.9)

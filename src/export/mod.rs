@@ -24,6 +24,7 @@ pub mod matching;
 pub mod mip;
 mod neighbours;
 pub mod original;
+pub mod orm;
 pub mod package;
 pub mod png;
 pub mod project;

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use super::edge::{bleed, nearest};
 use super::maps::Maps;
+use super::orm::Orms;
 use super::project::Texel;
 use crate::space::texture::{linear, srgb};
 
@@ -62,7 +63,7 @@ pub struct Texels {
     /// Each in 127ths, of both signs.
     normal: Vec<[u8; 4]>,
     /// Occlusion, roughness, metalness.
-    orm: Vec<[u8; 4]>,
+    orm: Orms,
 }
 
 impl Texels {
@@ -75,7 +76,7 @@ impl Texels {
         Self {
             color: plane(0),
             normal: plane(1),
-            orm: plane(2),
+            orm: Orms::empty(count, maps),
         }
     }
 
@@ -95,7 +96,7 @@ impl Texels {
         Stored {
             color: [r, g, b],
             normal: self.normal.get(at).map_or([0; 3], |&n| normal_bytes_in(n)),
-            orm: self.orm.get(at).map_or([0; 3], |&o| first_three(o)),
+            orm: self.orm.at(at),
             coverage,
         }
     }
@@ -107,9 +108,7 @@ impl Texels {
         if let Some(normal) = self.normal.get_mut(at) {
             put(normal, texel.normal.map(i8::cast_unsigned));
         }
-        if let Some(orm) = self.orm.get_mut(at) {
-            put(orm, texel.orm);
-        }
+        self.orm.set(at, texel.orm);
     }
 
     /// Covered share of one, 0 to 1.
@@ -139,13 +138,7 @@ impl Texels {
                 put(texel, normal_bytes(normal).map(i8::cast_unsigned));
             });
         }
-        let orm = |at: usize, &texel: &[u8; 4]| {
-            let orm = orm_of(first_three(texel));
-            (orm, share_of(colors[at]))
-        };
-        if !self.orm.is_empty() {
-            bleed(&mut self.orm, size, orm, |texel, o| put(texel, bytes(o)));
-        }
+        self.orm.bleed(size, |at| share_of(colors[at]));
         let color = |_, &texel: &[u8; 4]| (color_of(first_three(texel)), share_of(texel));
         bleed(&mut self.color, size, color, |texel, color| {
             put(texel, color_bytes(color));
@@ -173,10 +166,7 @@ impl Texels {
 
     /// RGBA of occlusion, roughness and metalness; they are no more.
     pub fn take_orms(&mut self) -> Vec<u8> {
-        let mut orms = std::mem::take(&mut self.orm);
-        orms.par_iter_mut()
-            .for_each(|pixel| *pixel = opaque(first_three(*pixel)));
-        orms.into_flattened()
+        self.orm.take()
     }
 }
 
@@ -201,7 +191,7 @@ fn opaque([a, b, c]: [u8; 3]) -> [u8; 4] {
     [a, b, c, 255]
 }
 
-fn byte(share: f32) -> u8 {
+pub(super) fn byte(share: f32) -> u8 {
     (share.clamp(0.0, 1.0) * 255.0 + 0.5) as u8
 }
 
