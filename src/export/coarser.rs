@@ -12,7 +12,8 @@ use rayon::prelude::*;
 
 use crate::botany::model::Image;
 
-/// Halves each side of the maps of light of a page (base colour, normals, others; as many as it has) so many times. Where they may be coarser at all, a map that is the same everywhere is one texel.
+/// Halves each side of the maps of light of a page (base colour, normals, others; as many as it has) so many times.
+/// Where they may be coarser at all, a map that is the same everywhere is one texel.
 pub fn coarsen_light(page: &mut [Image], halvings: u32) {
     if halvings > 0 {
         page.iter_mut().skip(1).for_each(shrink_if_same);
