@@ -17,7 +17,7 @@ pub fn pool(threads: usize) -> Result<ThreadPool> {
 ///
 /// # Errors
 /// [`Error::Internal`] where the system has none to give, or where this was asked before.
-pub fn pool_with_this(threads: usize) -> Result<ThreadPool> {
+pub fn pool_with_caller(threads: usize) -> Result<ThreadPool> {
     started(
         ThreadPoolBuilder::new()
             .num_threads(threads)

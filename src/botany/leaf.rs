@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 use super::model::Model;
 use super::part::{DisjointSets, Groups, Mix, Parts};
-use super::tree::{Few, Leaf, LeafClass, NO_NODE, Organ};
+use super::tree::{Leaf, LeafClass, NO_NODE, Organ, TriangleList};
 
 /// Centres closer than this share of the mean radius belong to one leaf.
 const SAME_CENTER: f64 = 0.05;
@@ -123,7 +123,7 @@ pub fn find(model: &Model, parts: &Parts, organs: &[Organ]) -> Leaves {
         .into_par_iter()
         .map(|g| {
             let members = groups.get(g).iter().map(|&piece| foliage[piece as usize]);
-            let mut triangles: Few = members
+            let mut triangles: TriangleList = members
                 .flat_map(|p| parts.triangles.get(p).iter().copied())
                 .collect();
             triangles.sort_unstable();

@@ -6,7 +6,7 @@ use smallvec::SmallVec;
 use super::model::Model;
 
 /// Triangles of which there are few, as most leaves have: up to four take no allocation of their own.
-pub type Few = SmallVec<[u32; 4]>;
+pub type TriangleList = SmallVec<[u32; 4]>;
 
 /// A model with its botany. All lengths are in normalised units (bounding-sphere radius one).
 #[derive(Clone, Debug, Default)]
@@ -50,7 +50,7 @@ pub enum Organ {
 #[derive(Clone, Debug, Default)]
 pub struct Leaf {
     /// Its triangles.
-    pub triangles: Few,
+    pub triangles: TriangleList,
     /// Its class of congruence.
     pub class: u32,
     /// Area-weighted centre of mass.

@@ -17,7 +17,7 @@ use crate::pipeline::{Limit, Request, Wanted, bake, to_json};
 use crate::recipe::{Preset, Recipe};
 use crate::report::schema::{Bake, Report};
 use crate::species::Species;
-use crate::threads::pool_with_this;
+use crate::threads::pool_with_caller;
 use crate::watch::Clock;
 
 /// Bake levels of detail of a tree, or of many.
@@ -122,7 +122,7 @@ pub fn run(args: Args) -> Result<()> {
         return batch::run(&batch, args.quiet, args.json);
     }
     let clock = Clock::new(Bars::new(args.quiet));
-    let pool = pool_with_this(args.threads.into())?;
+    let pool = pool_with_caller(args.threads.into())?;
     let baked = pool.install(|| bake(&request, &clock))?;
     clock.inner().finish();
     let stages = clock.finish();

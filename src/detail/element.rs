@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::opaque::Opaque;
 use crate::botany::model::Model;
-use crate::botany::tree::{Few, Leaf, NO_NODE, Organ, Tree};
+use crate::botany::tree::{Leaf, NO_NODE, Organ, Tree, TriangleList};
 use crate::cloud::occlusion::Occlusion;
 use crate::space::eigen::Moments;
 
@@ -21,7 +21,7 @@ const SAME_SHEET_COSINE: f32 = 0.6;
 #[derive(Clone, Debug)]
 pub struct Element {
     /// Triangles of the model.
-    pub triangles: Few,
+    pub triangles: TriangleList,
     /// Moments of its surface, weighted by area (opaque share only) times visibility, normalised
     /// units.
     pub moments: Moments,
@@ -187,7 +187,7 @@ fn element(
     Element {
         area: moments.weight as f32,
         solid: false,
-        triangles: Few::from_slice(&triangles),
+        triangles: TriangleList::from_slice(&triangles),
         moments,
         center,
         chain,

@@ -307,7 +307,7 @@ mod tests {
     use crate::botany::grow::{Options, Species, grow};
     use crate::botany::load::{Limits, load_slice};
     use crate::botany::recognise::{RecogniseOptions, recognise};
-    use crate::botany::tree::Few;
+    use crate::botany::tree::TriangleList;
 
     fn grown(species: &str, leaves: u32) -> Tree {
         let options = Options {
@@ -411,7 +411,7 @@ mod tests {
             tree.organ.push(Organ::Foliage);
             tree.wood_node.push(NO_NODE);
             tree.leaves.push(crate::botany::tree::Leaf {
-                triangles: Few::from_slice(&[i]),
+                triangles: TriangleList::from_slice(&[i]),
                 ..Default::default()
             });
             tree.subtrees.push(crate::botany::tree::Subtree {

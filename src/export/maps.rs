@@ -35,8 +35,8 @@ impl Maps {
         }
         // Of all objects, so that parts of a tree need what the whole does.
         let materials = model.objects.iter().map(|object| object.material as usize);
-        let even = materials.map(|number| even(&model.materials[number]));
-        even.reduce(Self::with).unwrap_or_default()
+        let each = materials.map(|number| needed_by(&model.materials[number]));
+        each.reduce(Self::with).unwrap_or_default()
     }
 
     /// What cards of two kinds need on one page.
@@ -105,7 +105,7 @@ impl Maps {
 }
 
 /// What a material alone needs.
-fn even(material: &Material) -> Maps {
+fn needed_by(material: &Material) -> Maps {
     match (material.metallic_roughness, material.occlusion) {
         (None, None) => Maps::Even {
             roughness: material.roughness_factor,

@@ -11,7 +11,7 @@ use super::refine::Target;
 use crate::botany::model::{Image, Model, Wrap};
 use crate::space::directions::Direction;
 use crate::space::raster::{
-    Camera, Geometry, Mask, Material, Mips, Sampling, Scene, Texture, Tone, coverage, tones,
+    Camera, Geometry, Mask, Material, Mips, Sampling, Scene, Texture, Tone, coverage, each_tone,
 };
 use crate::space::sector::{Eyes, Sector};
 use crate::space::texture::cutoff;
@@ -126,14 +126,10 @@ impl Original {
         let drawn = Drawn::colors(model);
         let scene = drawn.scene(model);
         let cameras: Vec<Camera> = self.toned_from(TONE_HEIGHT / self.height).collect();
-        let seen = cameras
-            .par_iter()
-            .map(|camera| tones(&scene, camera, SAMPLING));
-        let seen: Vec<Vec<(u32, Tone)>> = seen.collect();
         let mut all = vec![Tone::default(); model.triangles.len()];
-        for (triangle, tone) in seen.into_iter().flatten() {
-            all[triangle as usize].add(&tone);
-        }
+        each_tone(&scene, &cameras, SAMPLING, |triangle, tone| {
+            all[triangle as usize].add(tone);
+        });
         let seen = (0..).zip(all).filter(|(_, tone)| tone.covered > 0.0);
         let short = |tone: Tone| {
             let [r, g, b] = tone.light;

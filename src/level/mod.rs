@@ -137,8 +137,7 @@ impl Level {
 
     /// The same with sides of its maps of light halved so many times: see [`coarser`](crate::export::coarser).
     pub fn with_coarser_light(mut self, halvings: u32) -> Self {
-        let first = self.scene.images.len() - self.page_images().len();
-        coarsen_light(&mut self.scene.images[first..], halvings);
+        coarsen_light(self.page_images_mut(), halvings);
         self
     }
 
@@ -147,6 +146,12 @@ impl Level {
         let images = &self.scene.images;
         let first = first_of_page(images).filter(|_| !self.plan.cards.is_empty());
         first.map_or(&[], |first| &images[first..])
+    }
+
+    /// As [`Level::page_images`], to be changed.
+    fn page_images_mut(&mut self) -> &mut [Image] {
+        let first = self.scene.images.len() - self.page_images().len();
+        &mut self.scene.images[first..]
     }
 
     /// The page of its cards: base colour with alpha.

@@ -16,7 +16,7 @@ use crate::botany::model::Image;
 use crate::export::original::{Original, SAMPLING, raster_material};
 use crate::export::surface::{Scene, Surface};
 use crate::space::raster::{
-    self, Camera, Geometry, Material, Texture, Tone, linear_from_srgb, srgb_from_linear, tones,
+    self, Camera, Geometry, Material, Texture, Tone, each_tone, linear_from_srgb, srgb_from_linear,
 };
 
 /// Most that a channel's light is multiplied with, or divided by.
@@ -37,8 +37,7 @@ impl Baker<'_> {
     /// Gives the page of a level the colours that bring it to the original's mean.
     pub(super) fn toned(&self, mut level: Level) -> Level {
         let gain = gain(&[seen(&level, self.original)]);
-        let first = level.scene.images.len() - level.page_images().len();
-        if let Some(page) = level.scene.images.get_mut(first) {
+        if let Some(page) = level.page_images_mut().first_mut() {
             multiply(page, gain);
         }
         level
@@ -56,9 +55,8 @@ pub(super) fn toned(levels: &mut [Level], originals: &[&Original]) {
     };
     multiply(&mut page, gain(&all));
     for level in levels {
-        let first = level.scene.images.len() - level.page_images().len();
-        if let Some(image) = level.scene.images.get_mut(first) {
-            *image = page.clone();
+        if let Some(shown) = level.page_images_mut().first_mut() {
+            shown.clone_from(&page);
         }
     }
 }
@@ -170,11 +168,13 @@ impl Drawn {
             materials: &self.materials,
             textures: &self.textures,
         };
-        let seen = |camera| tones(&scene, camera, SAMPLING);
-        let seen: Vec<Vec<(u32, Tone)>> = cameras.par_iter().map(seen).collect();
-        let all = seen.into_iter().flatten();
-        let last = all.filter(|&(triangle, _)| triangle >= self.first_of_last);
-        last.map(|(_, tone)| tone).sum()
+        let mut sum = Tone::default();
+        each_tone(&scene, cameras, SAMPLING, |triangle, tone| {
+            if triangle >= self.first_of_last {
+                sum.add(tone);
+            }
+        });
+        sum
     }
 }
 

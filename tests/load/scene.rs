@@ -158,6 +158,31 @@ fn levels_that_another_node_names_are_left_out_of_the_scene() {
     assert!(error.to_string().contains("there is no node 99"), "{error}");
 }
 
+#[test]
+fn levels_that_name_the_next_coarser_one_each_are_all_left_out() {
+    let mut file = File::triangle();
+    let finest = file.load().unwrap();
+    let ids = |ids: &[usize]| json!({ "MSFT_lod": { "ids": ids } });
+    file.json["nodes"][0]["extensions"] = ids(&[1]);
+    let levels: Vec<usize> = [(2, 2), (3, 3), (2, 4)]
+        .into_iter()
+        .map(|(next, scale)| {
+            let scale = [scale; 3];
+            file.add(
+                "nodes",
+                json!({ "mesh": 0, "scale": scale, "extensions": ids(&[next]) }),
+            )
+        })
+        .collect();
+    assert_eq!(levels, [1, 2, 3]);
+    file.json["scenes"][0]["nodes"] = json!([3, 2, 1, 0]);
+    let model = file.load().unwrap();
+    assert_eq!(world(&model), world(&finest));
+    // Of two that name each other, and that no finer one names, both stay.
+    file.json["scenes"][0]["nodes"] = json!([3, 2]);
+    assert_eq!(file.load().unwrap().triangles.len(), 2);
+}
+
 /// Two sheets that cross, ten high and two wide, on a square of 20 by 20 whose node has this place.
 fn post_on(square: Value) -> pleach::botany::Model {
     let mut file = File::new();

@@ -44,11 +44,12 @@ const COLLISION_SUFFIXES: [&str; 2] = ["-colonly", "-convcolonly"];
 /// Names of pictures of the whole tree, the last level of some tools.
 const PICTURES: [&str; 3] = ["billboard", "impostor", "imposter"];
 
-/// The nodes that a node of the scene with these `roots` names as its coarser levels. They belong outside the scene, but
-/// stand in it in files that were taken apart and joined again. What is named itself names nothing: of two that name each
-/// other both are kept.
+/// The nodes that a node of the scene with these `roots` names as its coarser levels, and that these name again. They belong
+/// outside the scene, but stand in it in files that were taken apart and joined again. Only what nothing names begins: of
+/// two that name each other both are kept.
 pub(super) fn named(nodes: &[Node], roots: &[usize]) -> HashSet<usize> {
-    let mut claims: Vec<(usize, usize)> = Vec::new();
+    // Each node of the scene with the levels that it names.
+    let mut claims: HashMap<usize, Vec<usize>> = HashMap::new();
     let mut seen = vec![false; nodes.len()];
     let mut stack = roots.to_vec();
     while let Some(at) = stack.pop() {
@@ -61,12 +62,18 @@ pub(super) fn named(nodes: &[Node], roots: &[usize]) -> HashSet<usize> {
         stack.extend(&node.children);
         let levels = node.extensions.as_deref().and_then(|e| e.levels.as_ref());
         let ids = levels.into_iter().flat_map(|levels| &levels.ids);
-        let others = ids.filter(|&&id| id != at && id < nodes.len());
-        claims.extend(others.map(|&id| (at, id)));
+        let others = ids.copied().filter(|&id| id != at && id < nodes.len());
+        claims.insert(at, others.collect());
     }
-    let all: HashSet<usize> = claims.iter().map(|&(_, id)| id).collect();
-    claims.retain(|(by, _)| !all.contains(by));
-    claims.into_iter().map(|(_, id)| id).collect()
+    let all: HashSet<usize> = claims.values().flatten().copied().collect();
+    let finest = claims.keys().copied().filter(|at| !all.contains(at));
+    let mut out = HashSet::new();
+    let mut stack: Vec<usize> = finest.collect();
+    while let Some(at) = stack.pop() {
+        let levels = claims.get(&at).into_iter().flatten();
+        stack.extend(levels.copied().filter(|&id| out.insert(id)));
+    }
+    out
 }
 
 /// Which of some nodes that stand beside each other are left out by their names, in their order.

@@ -197,7 +197,7 @@ fn leaves_of_subtrees(tree: &Tree) -> Vec<Vec<u32>> {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::botany::tree::{Few, Leaf, Organ, Subtree};
+    use crate::botany::tree::{Leaf, Organ, Subtree, TriangleList};
 
     /// A trunk with `branches` branches around it, each with `leaves` square leaves along it.
     pub fn sample_tree(branches: usize, leaves: usize) -> Tree {
@@ -238,7 +238,7 @@ pub(super) mod tests {
         tree.model.triangles.push([first, first + 2, first + 3]);
         tree.organ.extend([Organ::Foliage; 2]);
         tree.leaves.push(Leaf {
-            triangles: Few::from_slice(&[triangle, triangle + 1]),
+            triangles: TriangleList::from_slice(&[triangle, triangle + 1]),
             center: middle,
             area: 0.0016,
             node: NO_NODE,

@@ -54,7 +54,7 @@ pub use relief::Relief;
 pub use shade::Light;
 pub use srgb::{linear_from_srgb, srgb_from_linear};
 pub use texture::Texture;
-pub use tone::{Tone, tone, tones};
+pub use tone::{Tone, each_tone, tone};
 
 use glam::{Vec2, Vec3};
 

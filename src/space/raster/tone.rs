@@ -2,6 +2,8 @@
 
 use std::iter::Sum;
 
+use rayon::prelude::*;
+
 use super::front::Front;
 use super::pane::Panes;
 use super::shade::Light;
@@ -42,7 +44,7 @@ impl Sum for Tone {
 
 /// What a camera sees of each triangle of a scene that it sees, in the order of triangles; of 4 x 4 samples a pixel at
 /// most.
-pub fn tones(scene: &Scene, camera: &Camera, sampling: Sampling) -> Vec<(u32, Tone)> {
+fn tones(scene: &Scene, camera: &Camera, sampling: Sampling) -> Vec<(u32, Tone)> {
     let corners = camera.project(scene.geometry.positions, sampling.side);
     let side = sampling.side as i32;
     let size = [camera.width as i32 * side, camera.height as i32 * side];
@@ -73,6 +75,24 @@ pub fn tones(scene: &Scene, camera: &Camera, sampling: Sampling) -> Vec<(u32, To
         same
     });
     out
+}
+
+/// Visits what each camera sees of each triangle that it sees, camera after camera.
+pub fn each_tone(
+    scene: &Scene,
+    cameras: &[Camera],
+    sampling: Sampling,
+    mut visit: impl FnMut(u32, &Tone),
+) {
+    // A few cameras at a time: what they see waits, and of a large tree that is megabytes each.
+    let at_a_time = 2 * rayon::current_num_threads();
+    for some in cameras.chunks(at_a_time) {
+        let seen = some.par_iter().map(|camera| tones(scene, camera, sampling));
+        let seen: Vec<Vec<(u32, Tone)>> = seen.collect();
+        for (triangle, tone) in seen.iter().flatten() {
+            visit(*triangle, tone);
+        }
+    }
 }
 
 /// What a camera sees of a scene.
