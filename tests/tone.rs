@@ -19,6 +19,9 @@ use tree::write_tree;
 /// Height of the tree in pixels where the level starts.
 const HEIGHT_PX: u32 = 64;
 
+/// The same where its tile takes over.
+const TILE_PX: u32 = 128;
+
 /// A white trunk, and dark leaves so small and sparse that few texels of a card are full of them.
 fn birch(file: &Path) {
     let random =
@@ -50,7 +53,7 @@ fn birch(file: &Path) {
 }
 
 #[test]
-fn a_white_birch_with_sparse_leaves_turns_no_whiter() {
+fn a_white_birch_with_sparse_leaves_turns_no_whiter_in_levels_and_tiles() {
     let folder = tempfile::tempdir().unwrap();
     let input = folder.path().join("tree.glb");
     birch(&input);
@@ -58,7 +61,10 @@ fn a_white_birch_with_sparse_leaves_turns_no_whiter() {
         input: input.clone(),
         output: folder.path().join("package"),
         wanted: Wanted::Limits(vec![Limit::Count(24)]),
-        recipe: Recipe::draft(),
+        recipe: Recipe {
+            hierarchy: true,
+            ..Recipe::draft()
+        },
         scene: Scene {
             heights_px: vec![HEIGHT_PX.into()],
             ..Scene::default()
@@ -67,11 +73,13 @@ fn a_white_birch_with_sparse_leaves_turns_no_whiter() {
         ..Request::default()
     };
     bake(&request, &Unwatched).unwrap();
-    let level = folder.path().join("package/tree_LOD1.glb");
-    let [original, level] = [input, level].map(|file| load(&file).unwrap());
+    let written =
+        ["tree_LOD1.glb", "tree_tile_0.glb"].map(|file| folder.path().join("package").join(file));
+    let original = load(&input).unwrap();
+    let [level, tile] = written.map(|file| load(&file).unwrap());
     let settings = Settings {
         // The original as fine as nobody sees it: no leaf falls between pixels.
-        heights_px: vec![16 * HEIGHT_PX, HEIGHT_PX],
+        heights_px: vec![16 * HEIGHT_PX, TILE_PX, HEIGHT_PX],
         client: true,
         // From nearer a lens would see more of the crown than of the trunk.
         lens: Lens::Parallel,
@@ -79,19 +87,25 @@ fn a_white_birch_with_sparse_leaves_turns_no_whiter() {
         views: 33,
         ..Settings::default()
     };
-    let report = evaluate((&original, "tree"), &[(&level, "level")], &settings);
+    let report = evaluate(
+        (&original, "tree"),
+        &[(&level, "level"), (&tile, "tile")],
+        &settings,
+    );
     let color = |sizes: &[pleach::report::schema::SizeFigures], height_px: u32| {
         let size = sizes.iter().find(|s| s.height_px == height_px).unwrap();
         size.client.as_ref().unwrap().base_color_linear.unwrap()
     };
     let wanted = color(&report.original.unwrap().sizes, 16 * HEIGHT_PX);
-    let found = color(&report.levels[0].sizes, HEIGHT_PX);
     // White and green, neither alone.
     assert!(wanted[0] > 0.05 && wanted[0] < 0.5, "{wanted:?}");
-    for (wanted, found) in wanted.into_iter().zip(found) {
-        assert!(
-            (found / wanted - 1.0).abs() < 0.08,
-            "{found} beside {wanted}"
-        );
+    for (row, height_px) in report.levels.iter().zip([HEIGHT_PX, TILE_PX]) {
+        for (wanted, found) in wanted.into_iter().zip(color(&row.sizes, height_px)) {
+            assert!(
+                (found / wanted - 1.0).abs() < 0.08,
+                "{}: {found} beside {wanted}",
+                row.file
+            );
+        }
     }
 }

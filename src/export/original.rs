@@ -22,8 +22,8 @@ pub const SAMPLING: Sampling = Sampling {
     mips: Mips::Base,
 };
 
-/// Height of the tree in pixels for its mean colours: one sample each.
-const TONE_HEIGHT: f32 = 384.0;
+/// Samples of a mask, along a line, for a pixel of the pictures that mean colours are summed from.
+const SAMPLES_A_PIXEL: f32 = 8.0 / 3.0;
 
 /// Images are halved to this side first: a mean needs no more.
 const TONE_SIDE: u32 = 1024;
@@ -125,7 +125,9 @@ impl Original {
     pub fn with_tones(self, model: &Model) -> Self {
         let drawn = Drawn::colors(model);
         let scene = drawn.scene(model);
-        let cameras: Vec<Camera> = self.toned_from(TONE_HEIGHT / self.height).collect();
+        let cameras: Vec<Camera> = self
+            .toned_from(self.samples_per_unit / SAMPLES_A_PIXEL)
+            .collect();
         let mut all = vec![Tone::default(); model.triangles.len()];
         each_tone(&scene, &cameras, SAMPLING, |triangle, tone| {
             all[triangle as usize].add(tone);

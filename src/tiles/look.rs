@@ -70,7 +70,8 @@ pub fn look(
         opaque: &opaque,
         hierarchy: &merge(&elements, recipe.locality),
         wood: &Wood::new(tree, true),
-        original: &Original::new(&tree.model, views, scene.sector(), SAMPLES * height_texels),
+        original: &Original::new(&tree.model, views, scene.sector(), SAMPLES * height_texels)
+            .with_tones(&tree.model),
         recipe,
     };
     let request = LevelRequest {
