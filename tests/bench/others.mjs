@@ -51,7 +51,11 @@ function timed(program, words) {
     maxBuffer: 1 << 28,
   });
   const times = /cpu ([\d.]+) ([\d.]+)\s*$/.exec(done.stderr);
-  if (done.status !== 0 || !times) throw new Error(`${basename(program)} ${words.join(' ')}: ${done.stderr}`);
+  if (done.status !== 0 || !times) {
+    // Some tell what is wrong on their standard output.
+    const told = (done.stdout + done.stderr).split('\n').filter((line) => /error/i.test(line));
+    throw new Error(`${basename(program)} ${words.join(' ')}: ${told.join(' ') || done.stderr}`);
+  }
   return { output: done.stdout, cpu: Number(times[1]) + Number(times[2]) };
 }
 
