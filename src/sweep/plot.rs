@@ -6,6 +6,11 @@ const WIDTH: f64 = 900.0;
 const HEIGHT: f64 = 560.0;
 /// Room for axes: left, top, right, bottom.
 const MARGIN: [f64; 4] = [70.0, 40.0, 230.0, 60.0];
+/// From line to line of names.
+const LINE: f64 = 13.0;
+/// Names that are no farther apart cover each other: less than a line, or a name moved down by one, rounded, would still
+/// be too near and be moved to the same place for ever.
+const TOUCHING: f64 = 12.5;
 /// Parts of an axis between its numbers.
 const STEPS: u32 = 5;
 
@@ -103,9 +108,9 @@ fn label_heights(axes: &Axes, runs: &[Run]) -> Vec<f64> {
         let mut at = y(i);
         while let Some(other) = placed
             .iter()
-            .find(|p| p[0] < right && left < p[1] && (p[2] - at).abs() < 13.0)
+            .find(|p| p[0] < right && left < p[1] && (p[2] - at).abs() < TOUCHING)
         {
-            at = other[2] + 13.0;
+            at = other[2] + LINE;
         }
         placed.push([left, right, at]);
         out[i] = at;
@@ -127,4 +132,30 @@ fn escape(text: &str) -> String {
     text.replace('&', "&amp;")
         .replace('<', "&lt;")
         .replace('>', "&gt;")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_at_any_height_stand_below_each_other() {
+        let axes = Axes {
+            seconds: [0.0, 1.0],
+            error: [0.0, 1.0],
+        };
+        // Heights of all parts of a pixel: a line below 51.02 rounds to less than a line.
+        for i in 0..=9973 {
+            let run = Run {
+                name: "balanced".into(),
+                f1_mean: f64::from(i) / 9973.0,
+                ..Run::default()
+            };
+            let found = label_heights(&axes, &[run.clone(), run.clone(), run]);
+            for k in 1..3 {
+                let apart = found[k] - found[k - 1];
+                assert!((apart - LINE).abs() < 1e-9, "{i}: {found:?}");
+            }
+        }
+    }
 }
