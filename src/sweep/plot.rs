@@ -144,7 +144,7 @@ mod tests {
             seconds: [0.0, 1.0],
             error: [0.0, 1.0],
         };
-        // Heights of all parts of a pixel: a line below 51.02 rounds to less than a line.
+        // Heights of all parts of a pixel: 138 of these, and a line below them, are less than a line apart when rounded.
         for i in 0..=9973 {
             let run = Run {
                 name: "balanced".into(),
