@@ -12,7 +12,7 @@ use crate::export::atlas::Layout;
 use crate::export::enough::enough;
 use crate::export::foliage::{BakeOptions, Foliage};
 use crate::export::level_scene::{AreaGoal, LevelScene, Sight};
-use crate::export::matching::{CONTRAST_GUESS, Matched, Matching, Standing};
+use crate::export::matching::{Matched, Matching, Standing};
 use crate::export::original::{Original, camera};
 use crate::export::refine::{Refine, Target, refine};
 use crate::export::surface::{Scene, Surface, scene_of_wood};
@@ -96,7 +96,7 @@ impl Baker<'_> {
         // trees): then the tubes become thinner, and the cards are fitted again.
         let mut radius_scale = 1.0f32;
         let mut tries = 0;
-        let mut guess = CONTRAST_GUESS;
+        let mut guess = request.contrast;
         loop {
             part(watch, "wood")?;
             let wood = self.wood(&plan, request, radius_scale);
@@ -246,6 +246,11 @@ fn grown(foliage: &Foliage, wood: &[Surface], goal: &AreaGoal, gap: f32) -> f64 
 }
 
 impl Fitted {
+    /// What was found for its alpha.
+    pub fn matched(&self) -> &Matched {
+        &self.matched
+    }
+
     /// The least covered area of all training views, over the original's.
     pub(super) fn least_view(&self, original: &Original) -> f64 {
         let unit = near_height_px(self.request) / original.height;

@@ -28,7 +28,7 @@ use crate::error::Result;
 use crate::export::chart::Chart;
 use crate::export::coarser::coarsen_light;
 use crate::export::maps::first_of_page;
-use crate::export::matching::Matched;
+use crate::export::matching::{CONTRAST_GUESS, Matched};
 use crate::export::original::Original;
 use crate::export::surface::{Scene, scene_of_model};
 use crate::ladder::{Rung, WHOLE_TREE_TRIANGLES};
@@ -69,6 +69,8 @@ pub struct LevelRequest {
     pub height_texels: f32,
     /// It starts no nearer than where its error (root mean square) is so many pixels.
     pub most_error_px: Option<f64>,
+    /// Contrast of the cards' alpha at which the search for it begins: see [`like`](Self::like).
+    pub contrast: i32,
 }
 
 impl LevelRequest {
@@ -84,7 +86,17 @@ impl LevelRequest {
             reach: height_px / rung.end_px as f32,
             height_texels: height_px.max(least),
             most_error_px: None,
+            contrast: CONTRAST_GUESS,
         }
+    }
+
+    /// The same, told what alpha another level of the tree got, if it has cards: theirs are alike, and the search is shorter.
+    pub fn like(self, other: &Matched) -> Self {
+        let contrast = match other.ratios.is_empty() {
+            true => self.contrast,
+            false => other.contrast,
+        };
+        Self { contrast, ..self }
     }
 
     /// The request for where a level of so large an error may start; `height` and `error` are in one
@@ -226,7 +238,7 @@ impl Baker<'_> {
         let Some(plan) = self.cut_with_level_cards(request) else {
             return Ok(Some(made));
         };
-        let other = self.fit(plan, request, watch)?;
+        let other = self.fit(plan, request.like(&made.matched), watch)?;
         let better = other.least_view(self.original) > least;
         Ok(Some(if better { other } else { made }))
     }

@@ -10,6 +10,7 @@ use crate::detail::opaque::Opaque;
 use crate::detail::optimal_distance::TEXELS;
 use crate::detail::wood::Wood;
 use crate::error::Result;
+use crate::export::matching::CONTRAST_GUESS;
 use crate::export::original::Original;
 use crate::level::{Baker, Level, LevelRequest};
 use crate::recipe::Recipe;
@@ -80,6 +81,7 @@ pub fn look(
         reach,
         height_texels,
         most_error_px: Some(recipe.tile_error_px),
+        contrast: CONTRAST_GUESS,
     };
     let level = baker.level(request, watch)?;
     let texel = f64::from(tree.model.height() / level.request.height_texels);
