@@ -10,7 +10,7 @@ use crate::detail::opaque::Opaque;
 use crate::detail::wood::Wood;
 use crate::error::Result;
 use crate::export::manifest::{Provenance, Range};
-use crate::export::original::Original;
+use crate::export::original::{Original, Pictures};
 use crate::export::shipped::not_shipped;
 use crate::ladder::{LEAST_TRIANGLES, Rung, ranges, rungs, seen};
 use crate::level::{Baker, MASK_HEIGHT};
@@ -100,8 +100,12 @@ impl<'t> Pieces<'t> {
             || merge(&elements, recipe.locality),
             || {
                 let wood = Wood::new(tree, true);
-                let original = Original::new(&tree.model, views, sector, MASK_HEIGHT);
-                (wood, original.with_tones(&tree.model))
+                let model = &tree.model;
+                let silhouettes = Pictures::silhouettes(model);
+                let original = Original::new(model, &silhouettes, views, sector, MASK_HEIGHT);
+                drop(silhouettes);
+                let colors = Pictures::colors(model);
+                (wood, original.with_tones(model, &colors))
             },
         );
         Ok(Self {

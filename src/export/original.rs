@@ -96,10 +96,17 @@ pub fn camera(direction: &Direction, pixels: f32) -> Camera {
 }
 
 impl Original {
-    /// Renders `model` from `views` directions of a sector, the tree `height_samples` samples high.
-    pub fn new(model: &Model, views: u32, sector: Sector, height_samples: f32) -> Self {
-        let drawn = Drawn::silhouettes(model);
-        let scene = drawn.scene(model);
+    /// Renders `model`, which has these silhouettes, from `views` directions of a sector, the tree `height_samples`
+    /// samples high.
+    pub fn new(
+        model: &Model,
+        silhouettes: &Pictures,
+        views: u32,
+        sector: Sector,
+        height_samples: f32,
+    ) -> Self {
+        let drawn = Drawn::new(model);
+        let scene = drawn.scene(model, silhouettes);
         let height = model.height().max(1e-6);
         let samples_per_unit = height_samples / height;
         let directions = sector.training(views);
@@ -122,9 +129,9 @@ impl Original {
     }
 
     /// With its colours.
-    pub fn with_tones(self, model: &Model) -> Self {
-        let drawn = Drawn::colors(model);
-        let scene = drawn.scene(model);
+    pub fn with_tones(self, model: &Model, colors: &Pictures) -> Self {
+        let drawn = Drawn::new(model);
+        let scene = drawn.scene(model, colors);
         let cameras: Vec<Camera> = self
             .toned_from(self.samples_per_unit / SAMPLES_A_PIXEL)
             .collect();
@@ -208,25 +215,21 @@ impl Original {
     }
 }
 
-/// The original for the raster.
-struct Drawn {
-    materials: Vec<Material>,
-    textures: Vec<Texture>,
-    triangle_material: Vec<u32>,
-}
+/// Images of a tree as its originals are drawn with them; those of its parts are the same.
+pub struct Pictures(Vec<Texture>);
 
-impl Drawn {
-    /// Images hold where they are opaque, no more.
-    fn silhouettes(model: &Model) -> Self {
+impl Pictures {
+    /// Where images are opaque, no more.
+    pub fn silhouettes(model: &Model) -> Self {
         let texture = |image: &Image| {
             let alpha = image.rgba.chunks_exact(4).map(|t| t[3]).collect();
             Texture::from_alpha(image.width, image.height, alpha)
         };
-        Self::new(model, model.images.par_iter().map(texture).collect())
+        Self(model.images.par_iter().map(texture).collect())
     }
 
-    /// Images are as large as a mean needs them.
-    fn colors(model: &Model) -> Self {
+    /// Images as large as a mean needs them.
+    pub fn colors(model: &Model) -> Self {
         let mut is_seen = vec![false; model.images.len()];
         for base in model.materials.iter().filter_map(|m| m.base_color) {
             is_seen[base.image as usize] = true;
@@ -242,19 +245,26 @@ impl Drawn {
             Texture::base_of_rgba(image.width, image.height, &image.rgba)
         };
         let images: Vec<(&Image, bool)> = model.images.iter().zip(is_seen).collect();
-        Self::new(model, images.into_par_iter().map(texture).collect())
+        Self(images.into_par_iter().map(texture).collect())
     }
+}
 
-    fn new(model: &Model, textures: Vec<Texture>) -> Self {
+/// The original for the raster.
+struct Drawn {
+    materials: Vec<Material>,
+    triangle_material: Vec<u32>,
+}
+
+impl Drawn {
+    fn new(model: &Model) -> Self {
         let of_object = |&o: &u32| model.objects[o as usize].material;
         Self {
             materials: model.materials.iter().map(raster_material).collect(),
-            textures,
             triangle_material: model.triangle_object.iter().map(of_object).collect(),
         }
     }
 
-    fn scene<'a>(&'a self, model: &'a Model) -> Scene<'a> {
+    fn scene<'a>(&'a self, model: &'a Model, Pictures(textures): &'a Pictures) -> Scene<'a> {
         Scene {
             geometry: Geometry {
                 positions: &model.positions,
@@ -265,7 +275,7 @@ impl Drawn {
                 triangle_material: &self.triangle_material,
             },
             materials: &self.materials,
-            textures: &self.textures,
+            textures,
         }
     }
 }

@@ -11,7 +11,7 @@ use crate::detail::optimal_distance::TEXELS;
 use crate::detail::wood::Wood;
 use crate::error::Result;
 use crate::export::matching::CONTRAST_GUESS;
-use crate::export::original::Original;
+use crate::export::original::{Original, Pictures};
 use crate::level::{Baker, Level, LevelRequest};
 use crate::recipe::Recipe;
 use crate::scene::Scene;
@@ -29,6 +29,22 @@ const SOLID_TEXELS: f32 = 1.0;
 /// Distance to its card within which a leaf is valid, in texels.
 const VALID_TEXELS: f64 = 4.0;
 
+/// A tree's images, made ready once for all its tiles.
+pub struct Images {
+    silhouettes: Pictures,
+    colors: Pictures,
+}
+
+impl Images {
+    /// Of a whole tree.
+    pub fn of(tree: &Tree) -> Self {
+        Self {
+            silhouettes: Pictures::silhouettes(&tree.model),
+            colors: Pictures::colors(&tree.model),
+        }
+    }
+}
+
 /// Billboards of a tile, and how well they stand for it; lengths in the tile's normalised units.
 pub struct Look {
     /// Cards and tubes.
@@ -43,13 +59,14 @@ pub struct Look {
     pub sigma: f64,
 }
 
-/// Bakes a tile of at most so many triangles, shown to `reach` times the distance where it takes over; `None` where the
+/// Bakes a tile, a part of the tree with these images, of at most so many triangles, shown to `reach` times the distance where it takes over; `None` where the
 /// tile itself has no more.
 ///
 /// # Errors
 /// [`Error::Interrupted`](crate::error::Error::Interrupted).
 pub fn look(
     tree: &Tree,
+    images: &Images,
     (recipe, scene): (&Recipe, &Scene),
     (triangles, reach): (u64, f32),
     watch: &dyn Watch,
@@ -64,15 +81,20 @@ pub fn look(
         element.solid = element.chain.is_some_and(thick);
     }
     let height_texels = DENSITY * tree.model.height();
-    let views = recipe.training_views;
+    let Images {
+        silhouettes,
+        colors,
+    } = images;
+    let (views, sector) = (recipe.training_views, scene.sector());
+    let height_samples = SAMPLES * height_texels;
+    let original = Original::new(&tree.model, silhouettes, views, sector, height_samples);
     let baker = Baker {
         tree,
         elements: &elements,
         opaque: &opaque,
         hierarchy: &merge(&elements, recipe.locality),
         wood: &Wood::new(tree, true),
-        original: &Original::new(&tree.model, views, scene.sector(), SAMPLES * height_texels)
-            .with_tones(&tree.model),
+        original: &original.with_tones(&tree.model, colors),
         recipe,
     };
     let request = LevelRequest {

@@ -8,7 +8,7 @@ mod look;
 use rayon::prelude::*;
 use serde_json::{Value, json};
 
-use self::look::{Look, look};
+use self::look::{Images, Look, look};
 use crate::botany::branch::branch;
 use crate::botany::tree::Tree;
 use crate::detail::tiles::{self, TileSize, tiles};
@@ -53,13 +53,20 @@ pub fn bake_tiles(
     };
     let found = tiles(tree, size);
     begin(watch, "bake tiles", found.len() as u64)?;
+    let images = Images::of(tree);
     let mut made: Vec<Made> = Vec::with_capacity(found.len());
     let mut generation = vec![(0, None)];
     while !generation.is_empty() {
         let first = made.len();
         let bake = |(i, &(at, parent)): (usize, &(u32, Option<u32>))| {
             let found = &found[at as usize];
-            let made = tile(tree, found, (first + i, parent), (recipe, scene), watch)?;
+            let made = tile(
+                (tree, &images),
+                found,
+                (first + i, parent),
+                (recipe, scene),
+                watch,
+            )?;
             step(watch).map(|()| made)
         };
         let baked: Vec<Made> = generation
@@ -80,6 +87,7 @@ pub fn bake_tiles(
         }
         generation = next;
     }
+    drop(images);
     let (mut list, mut files) = (Vec::new(), Vec::new());
     for made in made {
         list.push(made.tile);
@@ -102,7 +110,7 @@ struct Made {
 
 /// Bakes one tile, number `index` of its list.
 fn tile(
-    tree: &Tree,
+    (tree, images): (&Tree, &Images),
     found: &tiles::Tile,
     (index, parent): (usize, Option<u32>),
     (recipe, scene): (&Recipe, &Scene),
@@ -113,7 +121,7 @@ fn tile(
         0 => (WHOLE_TREE_TRIANGLES, f32::INFINITY),
         _ => (u64::from(recipe.tile_triangles), REACH),
     };
-    let look = look(&part, (recipe, scene), wanted, &Quiet(watch))?;
+    let look = look(&part, images, (recipe, scene), wanted, &Quiet(watch))?;
     let mut tile = Tile {
         parent,
         ..describe(index, found, &part, look.as_ref(), scene)
