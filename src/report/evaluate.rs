@@ -192,8 +192,9 @@ fn distance_m(original: &Model, lens: Lens, height_px: u32) -> f64 {
 fn overdraw(level: &Model, original: &Model, views: &[View], lens: Lens) -> f64 {
     let level = Drawable::silhouette(level);
     let (scene, place) = (level.scene(), level.placement_in(original.frame));
+    let height = original.height();
     let in_view = |view: &View| {
-        let camera = view.camera_through(lens, original.height(), 256);
+        let camera = view.camera_through(lens, height, 256);
         let (_, stats) = coverage_with_stats(&scene, &camera.placed(place), Sampling::CLIENT);
         stats.fragments as f64 / stats.covered.max(1) as f64
     };

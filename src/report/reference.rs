@@ -45,9 +45,9 @@ impl Reference {
         lens: Lens,
         height_px: u32,
     ) -> Self {
-        let scene = drawable.scene();
+        let (scene, height) = (drawable.scene(), original.height());
         let drawn = views.par_iter().map(|view| {
-            let camera = view.camera_through(lens, original.height(), height_px);
+            let camera = view.camera_through(lens, height, height_px);
             let mask = coverage(&scene, &camera, sampling(height_px));
             let original = mask.coverage();
             let moved = moved_f1(&mask, &original.fraction);

@@ -15,6 +15,10 @@ use crate::space::view::{Lens, View};
 /// with 16 samples a pixel, .97 with 1,024).
 const LEAST_SAMPLES: u32 = 512;
 
+/// Slices that triangles are sorted into from near to far. Of 444,633 triangles 4,096 slices take a quarter longer to
+/// draw at 128 pixels and a twentieth at 512.
+const SLICES: usize = 64;
+
 /// The samples of a picture in which the tree is so high, pixels: 4 x 4 a pixel, more in small ones.
 pub fn sampling(height_px: u32) -> Sampling {
     let side = LEAST_SAMPLES.div_ceil(height_px.max(1)).next_power_of_two();
@@ -62,9 +66,9 @@ impl<'m> Actor<'m> {
     }
 
     /// Nearest triangles first, as seen along `forward`: what is hidden then fails the cheap test of
-    /// depth before the dear one of alpha. Sorted into slices, which is enough for that.
+    /// depth before the dear one of alpha. Sorted into slices, which is enough for that; within one they stay in
+    /// the file's order, where neighbours share what is in the caches.
     pub fn front_to_back(&self, forward: Vec3) -> Order {
-        const SLICES: usize = 4096;
         let geometry = self.drawable.scene().geometry;
         let depths: Vec<f32> = geometry
             .triangles
@@ -234,8 +238,9 @@ mod tests {
         };
         let mut before = order.triangles.iter().map(depth);
         let after = order.triangles[1..].iter().map(depth);
-        // A slice is the 4096th part of at most six radii.
-        assert!(after.zip(&mut before).all(|(b, a)| a <= b + 6.0 / 4095.0));
+        // A slice is a part of at most six radii.
+        let slice = 6.0 / (SLICES - 1) as f32;
+        assert!(after.zip(&mut before).all(|(b, a)| a <= b + slice));
     }
 
     #[test]

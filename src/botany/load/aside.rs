@@ -48,7 +48,7 @@ const PICTURES: [&str; 3] = ["billboard", "impostor", "imposter"];
 /// outside the scene, but stand in it in files that were taken apart and joined again. Only what nothing names begins: of
 /// two that name each other both are kept.
 pub(super) fn named(nodes: &[Node], roots: &[usize]) -> HashSet<usize> {
-    // Each node of the scene with the levels that it names.
+    // Nodes of the scene that name levels, with those.
     let mut claims: HashMap<usize, Vec<usize>> = HashMap::new();
     let mut seen = vec![false; nodes.len()];
     let mut stack = roots.to_vec();
@@ -63,7 +63,10 @@ pub(super) fn named(nodes: &[Node], roots: &[usize]) -> HashSet<usize> {
         let levels = node.extensions.as_deref().and_then(|e| e.levels.as_ref());
         let ids = levels.into_iter().flat_map(|levels| &levels.ids);
         let others = ids.copied().filter(|&id| id != at && id < nodes.len());
-        claims.insert(at, others.collect());
+        let others: Vec<usize> = others.collect();
+        if !others.is_empty() {
+            claims.insert(at, others);
+        }
     }
     let all: HashSet<usize> = claims.values().flatten().copied().collect();
     let finest = claims.keys().copied().filter(|at| !all.contains(at));
