@@ -52,7 +52,7 @@ struct LeeArgs {
     /// Height of the tree, pixels.
     #[arg(long, default_value_t = 512, value_parser = clap::value_parser!(u32).range(16..=2048))]
     height: u32,
-    /// Views at least: around the tree at three elevations, and the top.
+    /// Number of views: around the tree at three elevations, and the top.
     #[arg(long, default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..=1000))]
     views: u32,
     /// Layers of the layer-plus-normal priority.

@@ -22,7 +22,7 @@ pub struct Settings {
     /// For each level the height from which it is shown, pixels: it is measured there and at half
     /// of it (twice the distance) as well. May be shorter than the list of levels.
     pub own_heights_px: Vec<Option<u32>>,
-    /// Number of views, the top included (at least; see [`views_of`]).
+    /// Number of views, the top included; more where every elevation would not have one (see [`views_of`]).
     pub views: usize,
     /// Azimuth of the first view, degrees.
     pub azimuth_offset_deg: f32,

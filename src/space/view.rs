@@ -68,7 +68,7 @@ pub struct View {
     pub elevation_deg: f32,
 }
 
-/// At least `count` views: equal azimuths at the elevations 0, 30 and -15 degrees, and the top.
+/// `count` views: equal azimuths at the elevations 0, 30 and -15 degrees, and the top.
 ///
 /// Another `offset_deg` (degrees of azimuth) gives another set, so that what was fitted to some
 /// views can be judged by others.
@@ -76,11 +76,13 @@ pub fn views(count: usize, offset_deg: f32) -> Vec<View> {
     views_at(&ELEVATIONS, count, offset_deg)
 }
 
-/// As [`views`], at other elevations (degrees above the horizon).
+/// As [`views`], at other elevations (degrees above the horizon): the first ones have an azimuth more where they can't
+/// all have as many, and each has one at least.
 pub fn views_at(elevations: &[f32], count: usize, offset_deg: f32) -> Vec<View> {
-    let rings = elevations.len().max(1);
-    let azimuths = count.saturating_sub(1).div_ceil(rings).max(1);
-    let ring = |elevation_deg: f32| {
+    let (around, rings) = (count.saturating_sub(1), elevations.len().max(1));
+    let ring = |(number, elevation_deg): (usize, f32)| {
+        let more = usize::from(number < around % rings);
+        let azimuths = (around / rings + more).max(1);
         (0..azimuths).map(move |i| {
             let azimuth_deg = (360.0 * i as f32 / azimuths as f32 + offset_deg).rem_euclid(360.0);
             View {
@@ -98,6 +100,7 @@ pub fn views_at(elevations: &[f32], count: usize, offset_deg: f32) -> Vec<View> 
     elevations
         .iter()
         .copied()
+        .enumerate()
         .flat_map(ring)
         .chain([top])
         .collect()
@@ -208,6 +211,18 @@ mod tests {
         assert_eq!(views[15].name, "top");
         assert!((views[15].towards_eye() - Vec3::Y).length() < 1e-6);
         assert!((views[0].towards_eye() - Vec3::Z).length() < 1e-6);
+    }
+
+    #[test]
+    fn there_are_as_many_views_as_are_asked_for_if_every_elevation_has_one() {
+        let elevations = [0.0, 30.0, -15.0, 60.0];
+        for (count, rings) in [(26, [7, 6, 6, 6]), (29, [7; 4]), (7, [2, 2, 1, 1])] {
+            let views = views_at(&elevations, count, 11.0);
+            assert_eq!(views.len(), count);
+            let found = elevations.map(|e| views.iter().filter(|v| v.elevation_deg == e).count());
+            assert_eq!(found, rings);
+        }
+        assert_eq!(views_at(&elevations, 2, 0.0).len(), 5);
     }
 
     #[test]

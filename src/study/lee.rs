@@ -33,7 +33,7 @@ pub const PRIORITIES: [&str; 4] = ["distance", "normal", "layer_normal", "measur
 pub struct Settings {
     /// Height of the tree in pixels.
     pub height_px: u32,
-    /// Views at least.
+    /// Number of views.
     pub views: usize,
     /// Layers of the third priority (the paper doesn't say how many).
     pub layers: u32,

@@ -59,8 +59,8 @@ pub struct Look {
     pub sigma: f64,
 }
 
-/// Bakes a tile, a part of the tree with these images, of at most so many triangles, shown to `reach` times the distance where it takes over; `None` where the
-/// tile itself has no more.
+/// Bakes a tile, a part of the tree that has these images, of at most so many triangles, shown to `reach` times the
+/// distance where it takes over; `None` where the tile itself has no more.
 ///
 /// # Errors
 /// [`Error::Interrupted`](crate::error::Error::Interrupted).

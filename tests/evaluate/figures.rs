@@ -222,7 +222,7 @@ fn the_original_itself_looks_like_the_original_and_moves_like_it() {
     };
     for size in &same.sizes {
         let look = size.appearance.as_ref().unwrap();
-        assert_eq!(look.views.len(), 7);
+        assert_eq!(look.views.len(), 6);
         assert_eq!((look.flip.worst, look.soft_f1.worst), (0.0, 1.0));
         assert_eq!(
             (look.incorrect_share_8.worst, look.psnr_db.worst),
