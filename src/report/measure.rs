@@ -34,8 +34,9 @@ pub fn measure<E: Send>(
     heights_px: &[u32],
     seen: &(dyn Fn() -> Result<(), E> + Sync),
 ) -> Result<Vec<Found>, E> {
+    let height = asked.original.height();
     let from = |view| {
-        let found = Stand::new(asked, actors, view).measure(heights_px);
+        let found = Stand::new(asked, actors, (view, height)).measure(heights_px);
         seen().map(|()| found)
     };
     let mut views: Vec<Vec<OfView>> = asked.views.par_iter().map(from).collect::<Result<_, E>>()?;

@@ -78,8 +78,8 @@ impl Drawn {
 }
 
 impl<'a> Stand<'a> {
-    /// Of the original and all levels (`actors`, in that order).
-    pub fn new(asked: &'a Asked, actors: &'a [Actor], view: &'a View) -> Self {
+    /// Of the original, so high in its normalised space, and all levels (`actors`, in that order).
+    pub fn new(asked: &'a Asked, actors: &'a [Actor], (view, height): (&'a View, f32)) -> Self {
         let next = (view.elevation_deg == 0.0).then(|| View {
             azimuth_deg: view.azimuth_deg + STEP_DEG,
             ..view.clone()
@@ -95,7 +95,7 @@ impl<'a> Stand<'a> {
                 true => orders.collect(),
                 false => Vec::new(),
             },
-            height: asked.original.height(),
+            height,
         }
     }
 
