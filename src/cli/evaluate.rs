@@ -30,7 +30,8 @@ pub struct Args {
     /// Heights of the tree on the screen, pixels.
     #[arg(long, value_delimiter = ',', default_value = "512,256,128,64,32", value_parser = clap::value_parser!(u32).range(4..=4096))]
     height: Vec<u32>,
-    /// Number of views: equal azimuths at each elevation, one more at the first ones where they do not divide, and the top.
+    /// Number of views: equal azimuths at each elevation (one at least; one more at the first ones where they do not divide),
+    /// and the top.
     #[arg(long, default_value_t = 26, value_parser = parse_views)]
     views: usize,
     /// Elevations of the views, degrees above the horizon.

@@ -2,9 +2,6 @@
 
 use super::rule::{MIPS, Rule};
 
-/// Alpha from which a texel passes the alpha test.
-pub(super) const CUTOFF: f64 = 128.0;
-
 /// Both alphas stay this far from the cutoff of 128: room for rounding in mips.
 pub(super) const HIGHEST_CONTRAST: f64 = 120.0;
 

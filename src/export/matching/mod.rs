@@ -15,12 +15,15 @@ mod mips;
 mod rule;
 mod stands;
 
+use self::found::HIGHEST_CONTRAST;
 pub use self::found::Matched;
-use self::found::{CUTOFF, HIGHEST_CONTRAST};
 pub use self::stands::Standing;
 use self::stands::Stands;
 use super::foliage::Foliage;
 use crate::space::root::Search;
+
+/// Least whole alpha that passes the alpha test of one half.
+const LEAST_PASSING: f64 = 128.0;
 
 /// Areas from afar this close are the same.
 const FAR_TOLERANCE: f64 = 4e-3;
@@ -48,16 +51,16 @@ const GRAIN: f64 = 0.01;
 /// over it, and over the contrast they are not.
 fn share_that_passes(contrast: f64) -> f64 {
     match contrast > 0.0 {
-        true => (CUTOFF - contrast) / (255.0 - contrast),
-        false => CUTOFF / (255.0 + contrast),
+        true => (LEAST_PASSING - contrast) / (255.0 - contrast),
+        false => LEAST_PASSING / (255.0 + contrast),
     }
 }
 
 /// The contrast at which it is such a share.
 fn contrast_of(share: f64) -> f64 {
-    match share < CUTOFF / 255.0 {
-        true => (CUTOFF - 255.0 * share) / (1.0 - share),
-        false => CUTOFF / share - 255.0,
+    match share < LEAST_PASSING / 255.0 {
+        true => (LEAST_PASSING - 255.0 * share) / (1.0 - share),
+        false => LEAST_PASSING / share - 255.0,
     }
 }
 
@@ -260,6 +263,27 @@ mod tests {
         let found = matched(|x, y| clump(x, y) < 7);
         assert!(found.contrast < 0, "{found:?}");
         assert!((found.near_ratio - 1.0).abs() < 0.05, "{found:?}");
+    }
+
+    #[test]
+    fn wherever_the_search_begins_it_ends_where_areas_are_alike() {
+        for most in [3, 7] {
+            let (mut foliage, score, area) = card_with(|x, y| clump(x, y) < most);
+            let goal = goal(area, &SIZES[..2]);
+            let mut balance = |guess| {
+                let standing = Standing {
+                    charts: 0..1,
+                    wood: &[],
+                    goal: &goal,
+                };
+                let mut matching = Matching::new(&foliage, score.clone(), &[standing]);
+                matching.area(&mut foliage, guess).balance()
+            };
+            let found = [-112, -40, CONTRAST_GUESS, 112].map(&mut balance);
+            for balance in found {
+                assert!((balance - found[2]).abs() < 0.05, "{most}: {found:?}");
+            }
+        }
     }
 
     #[test]

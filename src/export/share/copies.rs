@@ -14,8 +14,8 @@ use crate::export::chart::Chart;
 
 /// A card's difference from an empty one, at least, over the mean of all copies'. Without it a copy that shows nothing of a
 /// card of a few faint texels counts as one that shows nothing of what it should: eleven such cards, of 833 of three small
-/// oaks, that lack .0001 to .007 of their texels kept a page from being shared. With four times as much cards of an airy
-/// birch, few of whose texels are opaque, count as faint, too, and its third level finds no page.
+/// oaks, that lack .0001 to .007 of their texels kept a page from being shared. With .1 an airy birch, few of whose texels
+/// are opaque, gets fewer tiles, and its third level finds no page.
 const FAINT: f32 = 0.05;
 
 /// A card that shows another's texels.
@@ -50,6 +50,7 @@ pub fn copies(plan: &Plan, trees: &[Cards]) -> Option<Vec<Copy>> {
         let copy = Copy {
             card,
             chart: window.chart(of.before(trees), &look, density),
+            // Not yet over anything: what is faint is told by all copies.
             off: window.difference,
         };
         Some((copy, look.of_empty()))
@@ -103,10 +104,9 @@ mod tests {
 
     #[test]
     fn copies_are_as_far_off_as_empty_cards_would_be_unless_these_lack_next_to_nothing() {
-        let card = Card::rectangle(Vec3::ZERO, Vec3::X, Vec3::Y, Vec2::ONE);
-        let found = |card_number: u32, off: f32, empty: f32| {
-            let chart = Chart::new(&card, 8.0, 1.0);
-            let card = card_number;
+        let rectangle = Card::rectangle(Vec3::ZERO, Vec3::X, Vec3::Y, Vec2::ONE);
+        let found = |card: u32, off: f32, empty: f32| {
+            let chart = Chart::new(&rectangle, 8.0, 1.0);
             (Copy { card, chart, off }, empty)
         };
         // A half of what it should show, nine tenths, and nothing of nearly nothing.
