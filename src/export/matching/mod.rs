@@ -3,7 +3,7 @@
 //! Alpha in a plain PNG decides what is seen from near, where the base level is read, and from afar, where
 //! box filtered mips are. Which texels are opaque is one threshold of their scores: it sets the area from near.
 //! By how much their alpha differs from the cutoff is free, and so it is chosen mip by mip which blocks of texels
-//! pass ([`mips`]), such that a client covers what the original does ([`rounds`]).
+//! pass (`mips`), such that a client covers what the original does (`rounds`).
 
 mod block;
 mod found;
