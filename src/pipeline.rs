@@ -8,7 +8,6 @@ use crate::detail::optimal_cut::Candidate;
 use crate::error::{Error, Result};
 use crate::export::combined::Packed;
 use crate::export::manifest::{Manifest, Provenance, Range, Visibility};
-use crate::export::matching::Matched;
 use crate::export::package::{Package, remove_beside};
 use crate::knobs::check;
 use crate::ladder::Rung;
@@ -208,11 +207,10 @@ fn levels(
     let heights: Vec<u32> = rungs.iter().map(|r| pixels(r.height_px)).collect();
     let ruler = (request.recipe.sharing > 0.0)
         .then(|| sharing::Ruler::new(&tree.model, &heights, &settings(&request.scene)));
-    let mut before = Matched::default();
     for rung in rungs {
         let level = levels.packed.len();
         let rung = needed(rung, request.max_error_px, &baker);
-        let level_wanted = LevelRequest::of(&rung, request.recipe.method).like(&before);
+        let level_wanted = LevelRequest::of(&rung, request.recipe.method);
         // A level's images are encoded while the next one is made: PNG of one page keeps one core busy.
         let last = levels.packed.last_mut();
         let (made, encoded) = rayon::join(
@@ -220,7 +218,6 @@ fn levels(
             || last.map_or(Ok(()), encode_images_of),
         );
         let (made, ()) = (made?, encoded?);
-        before = made.matched.clone();
         let (made, share) = match &ruler {
             Some(ruler) => {
                 let most = (pixels(rung.height_px), request.recipe.sharing);

@@ -19,7 +19,7 @@ use pleach::watch::Unwatched;
 use serde_json::Value;
 use tempfile::TempDir;
 
-const MOST: f64 = 0.02;
+const MOST: f64 = 0.015;
 
 /// A name that a URI has to say in other letters.
 const SPECIES: &str = "our oaks 50%41 #1";

@@ -19,8 +19,8 @@ use tree::write_tree;
 /// Height of the tree in pixels where the level starts.
 const HEIGHT_PX: u32 = 64;
 
-/// The same where its tile takes over.
-const TILE_PX: u32 = 128;
+/// The same where its tile takes over: at half as many texels.
+const TILE_PX: u32 = 31;
 
 /// A white trunk, and dark leaves so small and sparse that few texels of a card are full of them.
 fn birch(file: &Path) {

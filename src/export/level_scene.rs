@@ -62,6 +62,11 @@ struct Part {
 
 impl Part {
     fn scene(&self) -> Scene<'_> {
+        self.scene_with(&self.textures)
+    }
+
+    /// The same with other textures.
+    fn scene_with<'s>(&'s self, textures: &'s [Texture]) -> Scene<'s> {
         Scene {
             geometry: Geometry {
                 positions: &self.surface.positions,
@@ -72,7 +77,7 @@ impl Part {
                 triangle_material: &[],
             },
             materials: &self.materials,
-            textures: &self.textures,
+            textures,
         }
     }
 }
@@ -148,9 +153,16 @@ impl LevelScene {
         textures.iter_mut().for_each(|t| t.set_alpha(alpha));
     }
 
-    /// Thresholds of the pixels near, beside the wood there.
-    pub fn critical(&self, cameras: &[Camera], wood: &[Mask], scores: Scores) -> Critical {
-        let scene = self.cards.scene();
+    /// Thresholds of the pixels near, beside the wood there. For scores of a mip `texture` is one as large.
+    pub fn critical(
+        &self,
+        cameras: &[Camera],
+        wood: &[Mask],
+        scores: Scores,
+        texture: Option<&Texture>,
+    ) -> Critical {
+        let textures = texture.map_or(&self.cards.textures[..], std::slice::from_ref);
+        let scene = self.cards.scene_with(textures);
         let draw = |(camera, wood)| critical(&scene, camera, wood, scores);
         let views: Vec<Critical> = cameras.par_iter().zip(wood).map(draw).collect();
         Critical {

@@ -36,7 +36,7 @@ impl Baker<'_> {
         let Some(plan) = self.one_sided_within(request.triangles) else {
             return Ok(made);
         };
-        let other = self.fit(plan, request.like(&made.matched), watch)?;
+        let other = self.fit(plan, request, watch)?;
         let nearer = self.agreement(&other) > self.agreement(&made);
         Ok(if nearer { other } else { made })
     }

@@ -32,7 +32,7 @@ impl Baker<'_> {
         }
         let (model, radii) = (&self.tree.model, self.radii());
         let plan = whole_tree(model, self.elements, &radii, request.triangles);
-        let whole = self.fit(plan, request.like(&made.matched), watch)?;
+        let whole = self.fit(plan, request, watch)?;
         let gain = self.agreement(&whole) - self.agreement(&made);
         Ok(if gain > WORTH { whole } else { made })
     }

@@ -32,15 +32,6 @@ fn near_height_px(request: LevelRequest) -> f32 {
 /// level is largest on the screen.
 const MATCHED: usize = 3;
 
-/// Distances at which a client's area is matched at most, each twice the one before.
-const SIGHTS: u32 = 4;
-
-/// How much farther than where it ends a level may be matched: the next one fades in.
-const BEYOND: f32 = 1.5;
-
-/// Trees of fewer pixels are not matched: they have too few to count.
-const LEAST_PX: f32 = 7.0;
-
 /// Times that the wood's radius is tried.
 const WOOD_TRIES: u32 = 4;
 
@@ -96,7 +87,6 @@ impl Baker<'_> {
         // trees): then the tubes become thinner, and the cards are fitted again.
         let mut radius_scale = 1.0f32;
         let mut tries = 0;
-        let mut guess = request.contrast;
         loop {
             part(watch, "wood")?;
             let wood = self.wood(&plan, request, radius_scale);
@@ -121,7 +111,7 @@ impl Baker<'_> {
             };
             let smaller;
             let mut matching = Matching::new(&foliage, score, std::slice::from_ref(&standing));
-            let mut matched = matching.area(&mut foliage, guess);
+            let mut matched = matching.near(&mut foliage);
             if let Some(score) = again {
                 let gap = gap(self.original, request);
                 smaller = goal.over(grown(&foliage, &wood.surfaces, &goal, gap));
@@ -130,13 +120,12 @@ impl Baker<'_> {
                     ..standing
                 };
                 matching = Matching::new(&foliage, score, &[standing]);
-                matched = matching.area(&mut foliage, matched.contrast);
+                matched = matching.near(&mut foliage);
             }
             tries += 1;
-            guess = matched.contrast;
             let over = matched.near_ratio;
             if tries == WOOD_TRIES || plan.tubes.is_empty() || over <= 1.0 + WOOD_TOLERANCE {
-                matching.from_afar(&mut foliage, &mut matched);
+                matching.client(&mut foliage, &mut matched);
                 return Ok(Fitted {
                     request,
                     plan,
@@ -178,7 +167,7 @@ impl Baker<'_> {
         }
     }
 
-    /// What the level should cover where it starts, and from afar.
+    /// What the level should cover from near, where it starts and at twice that distance.
     pub(super) fn goal(&self, request: LevelRequest) -> AreaGoal {
         let areas = self.original.areas();
         let seen = |pixels: f32, every: usize| {
@@ -190,19 +179,12 @@ impl Baker<'_> {
                 area: area * f64::from(unit * unit),
             }
         };
-        let halved = |times: u32| request.height_px / (1u32 << times) as f32;
-        let own = seen(request.height_px, 2 * MATCHED);
-        let far = seen(halved(1), MATCHED);
-        let sees = |times: &u32| {
-            halved(*times) >= LEAST_PX && (1u32 << times) as f32 <= BEYOND * request.reach
-        };
-        let beyond = (2..SIGHTS).take_while(sees).map(halved);
         AreaGoal {
             near: seen(near_height_px(request), MATCHED),
-            client: [own, far]
-                .into_iter()
-                .chain(beyond.map(|px| seen(px, 1)))
-                .collect(),
+            client: vec![
+                seen(request.height_px, 2 * MATCHED),
+                seen(request.height_px / 2.0, MATCHED),
+            ],
         }
     }
 

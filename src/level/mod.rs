@@ -28,7 +28,7 @@ use crate::error::Result;
 use crate::export::chart::Chart;
 use crate::export::coarser::coarsen_light;
 use crate::export::maps::first_of_page;
-use crate::export::matching::{CONTRAST_GUESS, Matched};
+use crate::export::matching::Matched;
 use crate::export::original::Original;
 use crate::export::surface::{Scene, scene_of_model};
 use crate::ladder::{Rung, WHOLE_TREE_TRIANGLES};
@@ -63,14 +63,10 @@ pub struct LevelRequest {
     pub triangles: u64,
     /// Height of the tree in pixels where the level starts.
     pub height_px: f32,
-    /// It is shown to so many times the distance where it starts; infinite: it never ends.
-    pub reach: f32,
     /// Height of the tree in texels of its cards.
     pub height_texels: f32,
     /// It starts no nearer than where its error (root mean square) is so many pixels.
     pub most_error_px: Option<f64>,
-    /// Contrast of the cards' alpha at which the search for it begins: see [`like`](Self::like).
-    pub contrast: i32,
 }
 
 impl LevelRequest {
@@ -83,20 +79,9 @@ impl LevelRequest {
         Self {
             triangles: rung.triangles,
             height_px,
-            reach: height_px / rung.end_px as f32,
             height_texels: height_px.max(least),
             most_error_px: None,
-            contrast: CONTRAST_GUESS,
         }
-    }
-
-    /// The same, told what alpha another level of the tree got, if it has cards: theirs are alike, and the search is shorter.
-    pub fn like(self, other: &Matched) -> Self {
-        let contrast = match other.ratios.is_empty() {
-            true => self.contrast,
-            false => other.contrast,
-        };
-        Self { contrast, ..self }
     }
 
     /// The request for where a level of so large an error may start; `height` and `error` are in one
@@ -124,7 +109,7 @@ pub struct Level {
     pub request: LevelRequest,
     /// Cards and wood of the cut.
     pub plan: LevelPlan,
-    /// Threshold and floor of the alpha, and what they gave.
+    /// Threshold of the alpha, and what it gave.
     pub matched: Matched,
     /// Where each card lies in the atlas, then the backs of those that have one.
     pub charts: Vec<Chart>,
@@ -238,7 +223,7 @@ impl Baker<'_> {
         let Some(plan) = self.cut_with_level_cards(request) else {
             return Ok(Some(made));
         };
-        let other = self.fit(plan, request.like(&made.matched), watch)?;
+        let other = self.fit(plan, request, watch)?;
         let better = other.least_view(self.original) > least;
         Ok(Some(if better { other } else { made }))
     }

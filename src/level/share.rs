@@ -9,7 +9,7 @@ use crate::error::Result;
 use crate::export::atlas::MAX_SIDE;
 use crate::export::coarser::coarsen_light;
 use crate::export::level_scene::AreaGoal;
-use crate::export::matching::{CONTRAST_GUESS, Matched, Matching, Standing};
+use crate::export::matching::{Matched, Matching, Standing};
 use crate::export::original::Original;
 use crate::export::refine::{Target, f1, refine};
 use crate::export::share::{self, Cards, Kin, Lone, Plan, Shared, kin, lone, share};
@@ -188,13 +188,9 @@ impl<'a> Table<'a> {
             goal,
         };
         let standing: Vec<Standing> = both.map(stand).collect();
-        let guess = match self.guests {
-            [only] => only.fitted.matched.contrast,
-            _ => CONTRAST_GUESS,
-        };
         let mut matching = Matching::new(&shared.foliage, score, &standing);
-        let mut matched = matching.area(&mut shared.foliage, guess);
-        matching.from_afar(&mut shared.foliage, &mut matched);
+        let mut matched = matching.near(&mut shared.foliage);
+        matching.client(&mut shared.foliage, &mut matched);
         let good = |(i, &least): (usize, &f64)| {
             f1(&shared.foliage, self.charts[i].clone(), &self.targets[i]) >= least
         };

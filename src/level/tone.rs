@@ -13,18 +13,15 @@ use rayon::prelude::*;
 
 use super::{Baker, Level};
 use crate::botany::model::Image;
-use crate::export::original::{Original, SAMPLING, raster_material};
+use crate::export::original::{Original, raster_material};
 use crate::export::surface::{Scene, Surface};
 use crate::space::raster::{
-    self, Camera, Geometry, Material, Texture, Tone, each_tone, linear_from_srgb, srgb_from_linear,
+    self, Camera, Geometry, Material, Sampling, Texture, Tone, each_tone, linear_from_srgb,
+    srgb_from_linear,
 };
 
 /// Most that a channel's light is multiplied with, or divided by.
 const MOST: f64 = 2.0;
-
-/// Height of the tree in pixels in which cards are looked at: one sample each, of the base level, which gives the same mean
-/// from any distance.
-const HEIGHT_PX: f32 = 192.0;
 
 /// What is seen of a level's cards, and in the original of what they stand for.
 #[derive(Default)]
@@ -72,7 +69,9 @@ fn seen(level: &Level, original: &Original) -> Seen {
     if wanted.covered == 0.0 || level.page().is_none() {
         return Seen::default();
     }
-    let cameras: Vec<Camera> = original.toned_from(HEIGHT_PX / original.height).collect();
+    // As a client draws them where the level starts: what passes in mips is not what passes in the base level.
+    let pixels = level.request.height_px / original.height;
+    let cameras: Vec<Camera> = original.toned_from(pixels).collect();
     Seen {
         original: wanted,
         cards: Drawn::new(&level.scene).last_surface(&cameras),
@@ -142,7 +141,7 @@ impl Drawn {
         }
         let is_seen = scene.colored_images();
         let texture = |(image, is_seen): (&Image, bool)| match is_seen {
-            true => Texture::base_of_rgba(image.width, image.height, &image.rgba),
+            true => Texture::from_rgba(image.width, image.height, &image.rgba),
             false => Texture::from_alpha(1, 1, vec![255]),
         };
         Self {
@@ -169,7 +168,7 @@ impl Drawn {
             textures: &self.textures,
         };
         let mut sum = Tone::default();
-        each_tone(&scene, cameras, SAMPLING, |triangle, tone| {
+        each_tone(&scene, cameras, Sampling::CLIENT, |triangle, tone| {
             if triangle >= self.first_of_last {
                 sum.add(tone);
             }

@@ -11,7 +11,6 @@ mod min_triangle;
 pub mod polyline;
 pub mod random;
 pub mod raster;
-pub mod root;
 pub mod sector;
 pub mod sha256;
 pub mod texture;

@@ -13,7 +13,6 @@ use std::path::PathBuf;
 
 use crate::error::{Error, Result};
 use crate::export::manifest::Manifest;
-use crate::export::matching::Matched;
 use crate::export::package::{Package, remove_beside};
 use crate::knobs::check;
 use crate::level::{Baker, Level, LevelRequest};
@@ -248,7 +247,6 @@ fn bake_pages<'t>(
     files.images(None, originals.collect())?;
     step(watch)?;
     let mut pages = Vec::with_capacity(heights.len());
-    let mut before = vec![Matched::default(); trees.len()];
     for height_px in heights {
         let at = |t: &Prepared| t.rungs.iter().position(|r| r.height_px == height_px);
         let mut candidates = Vec::new();
@@ -256,10 +254,9 @@ fn bake_pages<'t>(
         for (i, (t, baker)) in trees.iter().zip(bakers).enumerate() {
             let Some(rung) = at(t) else { continue };
             let rung = needed(&t.rungs[rung], request.max_error_px, baker);
-            let wanted = LevelRequest::of(&rung, baker.recipe.method).like(&before[i]);
+            let wanted = LevelRequest::of(&rung, baker.recipe.method);
             match baker.fitted(wanted, watch)? {
                 Some(fitted) => {
-                    before[i] = fitted.matched().clone();
                     candidates.push(Candidate { tree: i, fitted });
                 }
                 // The original fits into the budget.

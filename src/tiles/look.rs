@@ -10,7 +10,6 @@ use crate::detail::opaque::Opaque;
 use crate::detail::optimal_distance::TEXELS;
 use crate::detail::wood::Wood;
 use crate::error::Result;
-use crate::export::matching::CONTRAST_GUESS;
 use crate::export::original::{Original, Pictures};
 use crate::level::{Baker, Level, LevelRequest};
 use crate::recipe::Recipe;
@@ -59,8 +58,8 @@ pub struct Look {
     pub sigma: f64,
 }
 
-/// Bakes a tile, a part of the tree that has these images, of at most so many triangles, shown to `reach` times the
-/// distance where it takes over; `None` where the tile itself has no more.
+/// Bakes a tile, a part of the tree that has these images, of at most so many triangles;
+/// `None` where the tile itself has no more.
 ///
 /// # Errors
 /// [`Error::Interrupted`](crate::error::Error::Interrupted).
@@ -68,7 +67,7 @@ pub fn look(
     tree: &Tree,
     images: &Images,
     (recipe, scene): (&Recipe, &Scene),
-    (triangles, reach): (u64, f32),
+    triangles: u64,
     watch: &dyn Watch,
 ) -> Result<Option<Look>> {
     if triangles >= tree.model.triangles.len() as u64 {
@@ -100,10 +99,8 @@ pub fn look(
     let request = LevelRequest {
         triangles,
         height_px: height_texels,
-        reach,
         height_texels,
         most_error_px: Some(recipe.tile_error_px),
-        contrast: CONTRAST_GUESS,
     };
     let level = baker.level(request, watch)?;
     let texel = f64::from(tree.model.height() / level.request.height_texels);

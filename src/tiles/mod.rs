@@ -30,9 +30,6 @@ const SHARES: usize = 128;
 /// Times the least that loose pieces hold before they are halved.
 const LOOSE: usize = 4;
 
-/// From about so many times a tile's distance on its carrier stands for it.
-const REACH: f32 = 2.0;
-
 /// Bakes and writes the hierarchy of a tree; returns what the manifest says of it, and the names of
 /// the images that its files share.
 ///
@@ -118,8 +115,8 @@ fn tile(
 ) -> Result<Made> {
     let part = branch(tree, &found.triangles);
     let wanted = match index {
-        0 => (WHOLE_TREE_TRIANGLES, f32::INFINITY),
-        _ => (u64::from(recipe.tile_triangles), REACH),
+        0 => WHOLE_TREE_TRIANGLES,
+        _ => u64::from(recipe.tile_triangles),
     };
     let look = look(&part, images, (recipe, scene), wanted, &Quiet(watch))?;
     let mut tile = Tile {

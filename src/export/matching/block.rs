@@ -1,6 +1,7 @@
 //! A block of texels with all smaller ones in it: what becomes of them where some are to pass.
 
-use super::rule::Rule;
+use super::rule::{Rule, alpha};
+use crate::space::raster::ScorePage;
 
 /// What a mean alpha must be to pass.
 pub const CUTOFF: f32 = 127.5;
@@ -22,16 +23,15 @@ struct Span {
 }
 
 impl Span {
-    /// On its side of the cutoff, if it can be.
+    /// As near to this as it can be, and on the same side of the cutoff if that can be.
     #[inline]
-    fn on_side(mut self, passes: bool) -> Self {
-        if passes && self.high >= PASSING {
+    fn towards(mut self, wanted: f32) -> Self {
+        if wanted >= CUTOFF && self.high >= PASSING {
             self.low = self.low.max(PASSING);
-            self.own = self.own.max(self.low);
-        } else if !passes && self.low <= FAILING {
+        } else if wanted < CUTOFF && self.low <= FAILING {
             self.high = self.high.min(FAILING);
-            self.own = self.own.min(self.high);
         }
+        self.own = wanted.clamp(self.low, self.high);
         self
     }
 }
@@ -42,8 +42,6 @@ pub struct Block {
     /// Where each mip begins.
     starts: Vec<usize>,
     spans: Vec<Span>,
-    /// Mean opacities: a texel's is a half where its score is at the threshold.
-    opacity: Vec<f32>,
 }
 
 impl Block {
@@ -58,7 +56,6 @@ impl Block {
             halvings,
             starts,
             spans: vec![Span::default(); count],
-            opacity: vec![0.0; count],
         }
     }
 
@@ -67,47 +64,45 @@ impl Block {
         1 << (self.halvings - mip)
     }
 
-    /// Reads the texels that begin at a column of so many; returns how many are opaque.
-    pub fn read(&mut self, scores: &[f32], (width, left): (usize, usize), rule: &Rule) -> usize {
+    /// Reads the texels that begin at a column of so many.
+    pub fn read(&mut self, scores: &[f32], (width, left): (usize, usize), rule: &Rule) {
         let side = self.side(0);
-        let mut count = 0;
         for (y, row) in scores.chunks_exact(width).enumerate() {
-            let out = self.spans[y * side..][..side].iter_mut();
-            let out = out.zip(&mut self.opacity[y * side..][..side]);
-            for ((span, opacity), &score) in out.zip(&row[left..]) {
-                *opacity = (score - rule.threshold + 0.5).clamp(0.0, 1.0);
+            let out = &mut self.spans[y * side..][..side];
+            for (span, &score) in out.iter_mut().zip(&row[left..]) {
                 let (low, high) = match score >= rule.threshold {
                     true => (PASSING, 255.0),
                     false if score > f32::NEG_INFINITY => (0.0, FAILING),
                     false => (0.0, 0.0),
                 };
-                count += usize::from(score >= rule.threshold);
-                let own = f32::from(rule.alpha(score)).clamp(low, high);
+                let own = alpha(score - rule.threshold).clamp(low, high);
                 *span = Span { low, high, own };
             }
         }
-        count
     }
 
-    /// What may become of its mips, given which of their texels pass.
-    pub fn join(&mut self, rule: &Rule) {
+    /// What may become of its mips, given which of their texels pass: those of `mips`, whose blocks begin here.
+    pub fn join(&mut self, mips: &[ScorePage], [left, top]: [usize; 2], rule: &Rule) {
         for mip in 0..self.halvings {
             let side = self.side(mip);
-            let (from, to) = (self.starts[mip], self.starts[mip + 1]);
-            let (finer, coarser) = self.spans.split_at_mut(to);
-            let (seen, coarser_seen) = self.opacity.split_at_mut(to);
-            let (finer, seen) = (&finer[from..], &seen[from..]);
+            let (finer, coarser) = self.spans.split_at_mut(self.starts[mip + 1]);
+            let finer = &finer[self.starts[mip]..];
+            let asked = rule.passes.get(mip).copied().flatten();
+            let asked = asked.map(|least| (least, &mips[mip]));
             each_four(side, |at, four| {
-                let four = four.map(|i| (finer[i], seen[i]));
-                let mean = |of: fn(&(Span, f32)) -> f32| four.iter().map(of).sum::<f32>() / 4.0;
-                coarser_seen[at] = mean(|(_, opacity)| *opacity);
+                let mean =
+                    |of: fn(&Span) -> f32| four.iter().map(|&i| of(&finer[i])).sum::<f32>() / 4.0;
                 let span = Span {
-                    low: mean(|(span, _)| span.low),
-                    high: mean(|(span, _)| span.high),
-                    own: mean(|(span, _)| span.own),
+                    low: mean(|span| span.low),
+                    high: mean(|span| span.high),
+                    own: mean(|span| span.own),
                 };
-                coarser[at] = match rule.passes[mip] {
-                    Some(least) => span.on_side(coarser_seen[at] >= least),
+                coarser[at] = match asked {
+                    Some((least, page)) => {
+                        let [x, y] = [left >> (mip + 1), top >> (mip + 1)];
+                        let score = page.score([x + at % (side / 2), y + at / (side / 2)]);
+                        span.towards(alpha(score - least))
+                    }
                     None => span,
                 };
             });
@@ -148,13 +143,6 @@ impl Block {
                 *out = (span.own + 0.5) as u8;
             }
         }
-    }
-
-    /// Calls `each` with the opacity and the mean alpha of every texel of a mip.
-    pub fn each(&self, mip: usize, mut each: impl FnMut(f32, f32)) {
-        let of_mip = self.starts[mip]..self.starts[mip + 1];
-        let both = self.opacity[of_mip.clone()].iter().zip(&self.spans[of_mip]);
-        both.for_each(|(&opacity, span)| each(opacity, span.own));
     }
 }
 

@@ -1,4 +1,4 @@
-//! Alpha of which chosen mips show as much as they should.
+//! Alpha of which every mip shows as much as it should.
 //!
 //! An engine's mips are means of alpha: what is sparse falls under the cutoff sooner or later and
 //! dissolves, what is dense closes up. But the test asks only whether a texel reaches the cutoff, not
@@ -9,28 +9,27 @@
 
 use rayon::prelude::*;
 
-use super::block::{Block, CUTOFF};
+use super::block::Block;
 use super::rule::{MIPS, Rule};
+use crate::space::raster::ScorePage;
 
-/// Opacities that blocks are told apart by.
-const STEPS: usize = 1024;
-
-/// Sets alpha from the scores of a page.
-pub fn fill(alpha: &mut [u8], scores: &[f32], size: [u32; 2], rule: &Rule) {
+/// Sets alpha from the scores of a page and of its mips.
+pub fn fill(alpha: &mut [u8], page: &ScorePage, mips: &[ScorePage], rule: &Rule) {
+    let scores = page.scores();
     if rule.passes == [None; MIPS] {
         let texels = alpha.par_iter_mut().zip(scores);
         texels.for_each(|(alpha, &score)| *alpha = rule.alpha(score));
         return;
     }
-    let (width, halvings) = (size[0] as usize, halvings(size));
+    let (width, halvings) = (page.size()[0], halvings(page.size()));
     let band = width << halvings;
     let bands = alpha.par_chunks_mut(band).zip(scores.par_chunks(band));
-    bands.for_each_init(
+    bands.enumerate().for_each_init(
         || Block::new(halvings),
-        |block, (alpha, scores)| {
+        |block, (number, (alpha, scores))| {
             for left in (0..width).step_by(1 << halvings) {
                 block.read(scores, (width, left), rule);
-                block.join(rule);
+                block.join(mips, [left, number << halvings], rule);
                 block.share_out();
                 block.write(alpha, (width, left));
             }
@@ -39,101 +38,42 @@ pub fn fill(alpha: &mut [u8], scores: &[f32], size: [u32; 2], rule: &Rule) {
 }
 
 /// Halvings of the largest blocks that a page is made of.
-fn halvings([width, height]: [u32; 2]) -> usize {
+fn halvings([width, height]: [usize; 2]) -> usize {
     (width | height | 1 << MIPS).trailing_zeros() as usize
 }
 
-/// What blocks of each mip there are where no mip asks for anything.
-pub struct Survey {
-    /// Opaque texels.
-    opaque: usize,
-    mips: [Blocks; MIPS],
-}
-
-/// The blocks of one mip.
-#[derive(Clone)]
-struct Blocks {
-    /// How many have each opacity.
-    count: Vec<u32>,
-    /// How many pass.
-    passed: usize,
-}
-
-impl Survey {
-    /// Of a page.
-    pub fn new(scores: &[f32], size: [u32; 2], rule: &Rule) -> Self {
-        let (width, halvings) = (size[0] as usize, halvings(size));
-        let passes = [None; MIPS];
-        let rule = Rule { passes, ..*rule };
-        let add = |(mut survey, mut block): (Self, Block), scores: &[f32]| {
-            for left in (0..width).step_by(1 << halvings) {
-                survey.opaque += block.read(scores, (width, left), &rule);
-                block.join(&rule);
-                for (of_mip, mip) in survey.mips.iter_mut().zip(1..=halvings) {
-                    block.each(mip, |opacity, alpha| of_mip.add(opacity, alpha));
-                }
-            }
-            (survey, block)
+/// The scores of a page's mips, the finest first: how opaque blocks of texels are in the mean, of which one is half
+/// opaque where its score is this threshold. Texels of no chart don't count.
+pub fn means(page: &ScorePage, threshold: f32) -> Vec<ScorePage> {
+    let opacity = |&score: &f32| match score > f32::NEG_INFINITY {
+        true => (score - threshold + 0.5).clamp(0.0, 1.0),
+        false => score,
+    };
+    let mut finer: Vec<f32> = page.scores().par_iter().map(opacity).collect();
+    let [mut width, mut height] = page.size();
+    let mut mips = Vec::new();
+    for _ in 0..halvings(page.size()).min(MIPS) {
+        let halved = |rows: &[f32]| {
+            let two = rows.split_at(width);
+            let pairs = two.0.chunks_exact(2).zip(two.1.chunks_exact(2));
+            let four = pairs.map(|(a, b)| mean([a[0], a[1], b[0], b[1]]));
+            four.collect::<Vec<f32>>()
         };
-        let bands = scores.par_chunks(width << halvings);
-        let counted = bands.fold(|| (Self::empty(), Block::new(halvings)), add);
-        let counted = counted.map(|(survey, _)| survey);
-        counted.reduce(Self::empty, Self::and)
+        let halves: Vec<Vec<f32>> = finer.par_chunks_exact(2 * width).map(halved).collect();
+        finer = halves.concat();
+        (width, height) = (width / 2, height / 2);
+        mips.push(ScorePage::new(width as u32, height as u32, finer.clone()));
     }
-
-    fn empty() -> Self {
-        let blocks = Blocks {
-            count: vec![0; STEPS],
-            passed: 0,
-        };
-        Self {
-            opaque: 0,
-            mips: std::array::from_fn(|_| blocks.clone()),
-        }
-    }
-
-    fn and(mut self, other: Self) -> Self {
-        self.opaque += other.opaque;
-        for (own, other) in self.mips.iter_mut().zip(&other.mips) {
-            own.passed += other.passed;
-            own.count
-                .iter_mut()
-                .zip(&other.count)
-                .for_each(|(a, b)| *a += b);
-        }
-        self
-    }
-
-    /// Of each mip the share of the page that passes, over that of texels which are opaque.
-    pub fn shares(&self) -> [f32; MIPS] {
-        let texels = |mip: usize| self.mips[mip].passed << (2 * (mip + 1));
-        std::array::from_fn(|mip| texels(mip) as f32 / self.opaque.max(1) as f32)
-    }
-
-    /// The opacity from which blocks of a mip (counted from 0) pass such that this is the share that does.
-    pub fn least(&self, mip: usize, share: f32) -> f32 {
-        self.mips[mip].least(share * self.opaque as f32 / (1usize << (2 * (mip + 1))) as f32)
-    }
+    mips
 }
 
-impl Blocks {
-    fn add(&mut self, opacity: f32, alpha: f32) {
-        self.count[(opacity * (STEPS - 1) as f32) as usize] += 1;
-        self.passed += usize::from(alpha >= CUTOFF);
-    }
-
-    /// The opacity that as many blocks have at least.
-    fn least(&self, wanted: f32) -> f32 {
-        let mut passed = 0.0;
-        for (step, &count) in self.count.iter().enumerate().rev() {
-            passed += count as f32;
-            if passed > wanted {
-                // The part of the step that is not wanted.
-                let over = (passed - wanted) / count as f32;
-                return (step as f32 + over) / (STEPS - 1) as f32;
-            }
-        }
-        0.0
+/// Of those that are of a chart.
+fn mean(four: [f32; 4]) -> f32 {
+    let some = four.iter().filter(|score| score.is_finite());
+    let (sum, count) = some.fold((0.0, 0), |(sum, count), score| (sum + score, count + 1));
+    match count {
+        0 => f32::NEG_INFINITY,
+        _ => sum / count as f32,
     }
 }
 
@@ -165,13 +105,8 @@ mod tests {
         .collect()
     }
 
-    fn survey(scores: &[f32], size: [u32; 2], alphas: [u8; 2]) -> Survey {
-        let rule = Rule {
-            threshold: 0.5,
-            alphas,
-            passes: [Some(0.1); MIPS],
-        };
-        Survey::new(scores, size, &rule)
+    fn page(scores: &[f32], size: [u32; 2]) -> ScorePage {
+        ScorePage::new(size[0], size[1], scores.to_vec())
     }
 
     fn passed(alpha: &[u8]) -> f32 {
@@ -179,64 +114,53 @@ mod tests {
     }
 
     #[test]
-    fn where_no_mip_asks_there_are_two_alphas_and_no_texel_changes_sides() {
+    fn where_no_mip_asks_each_texel_has_the_alpha_of_its_score() {
         let size = [64, 32];
         let mut scores = leaves(size);
         scores[5] = f32::NEG_INFINITY;
         let mut alpha = vec![7; scores.len()];
-        let rule = Rule {
-            threshold: 0.5,
-            alphas: [250, 20],
-            passes: [None; MIPS],
-        };
-        fill(&mut alpha, &scores, size, &rule);
+        fill(&mut alpha, &page(&scores, size), &[], &Rule::of(0.5));
         for (at, (&alpha, &score)) in alpha.iter().zip(&scores).enumerate() {
-            let wanted = if score > 0.5 { 250 } else { 20 };
+            // 127.5 + 200 * .4, and as much below.
+            let wanted = if score > 0.5 { 208 } else { 48 };
             assert_eq!(alpha, if at == 5 { 0 } else { wanted }, "{at}");
         }
     }
 
     #[test]
-    fn a_survey_counts_what_passes_and_finds_the_opacity_of_a_share() {
-        let size = [64, 32];
-        let survey = survey(&leaves(size), size, [255, 0]);
-        assert_eq!(survey.opaque, 32 * 4 + 16 * 4);
-        // Blocks of 2 x 2: leaves lie on them, stems of one texel in width are halves, which pass, too.
-        let shares = survey.shares();
-        assert_eq!(
-            shares[0],
-            (32 * 4 + 16 * 2 * 4) as f32 / survey.opaque as f32
-        );
-        // Blocks of 4 x 4: a quarter of one, a quarter of another: none passes.
-        assert_eq!(shares[1], 0.0);
-        // All 16 blocks of 8 x 8 on the left are more opaque than all on the right.
-        let half = survey.least(2, 16.0 * 64.0 / survey.opaque as f32);
-        assert!(
-            half > (4.0 * 0.9 + 60.0 * 0.1) / 64.0 && half < 0.2,
-            "{half}"
-        );
+    fn scores_of_mips_are_mean_opacities() {
+        let mut scores = vec![0.3; 64 * 32];
+        // The first block of 2 x 2: far above, at the threshold, far below, nobody's.
+        for (at, score) in [(0, 2.0), (1, 0.3), (64, -1.0), (65, f32::NEG_INFINITY)] {
+            scores[at] = score;
+        }
+        let mips = means(&page(&scores, [64, 32]), 0.3);
+        let sizes: Vec<[usize; 2]> = mips.iter().map(ScorePage::size).collect();
+        assert_eq!(sizes, [[32, 16], [16, 8], [8, 4], [4, 2], [2, 1]]);
+        // (1 + .5 + 0) / 3 and .5 are alike; of it and three blocks of a half, too.
+        assert_eq!(mips[0].score([0, 0]), 0.5);
+        assert_eq!(mips[0].score([1, 0]), 0.5);
+        scores[0] = -1.0;
+        let mips = means(&page(&scores, [64, 32]), 0.3);
+        assert!((mips[0].score([0, 0]) - 0.5 / 3.0).abs() < 1e-6);
+        assert!((mips[1].score([0, 0]) - (0.5 / 3.0 + 1.5) / 4.0).abs() < 1e-6);
     }
 
     #[test]
     fn sparse_leaves_show_in_a_coarse_mip_where_they_are_densest_and_keep_their_shape() {
         let size = [64, 32];
         let scores = leaves(size);
-        let survey = survey(&scores, size, [255, 32]);
-        // Of blocks of 8 x 8 texels those on the left half.
-        let mut passes = [None; MIPS];
-        passes[2] = Some(survey.least(2, 16.0 * 64.0 / survey.opaque as f32));
-        let rule = Rule {
-            threshold: 0.5,
-            alphas: [255, 32],
-            passes,
-        };
+        let page = page(&scores, size);
+        let mips = means(&page, 0.5);
+        // Of blocks of 8 x 8 texels, of which 4 or 8 are opaque (.9), those on the left half.
+        let between = (6.0 * 0.9 + 58.0 * 0.1) / 64.0;
+        let mut rule = Rule::of(0.5);
+        rule.passes[2] = Some(between);
         let mut alpha = vec![0; scores.len()];
-        fill(&mut alpha, &scores, size, &rule);
-        // No texel changes sides, none on the right changes at all.
+        fill(&mut alpha, &page, &mips, &rule);
+        // No texel changes sides.
         for (at, (&alpha, &score)) in alpha.iter().zip(&scores).enumerate() {
             assert_eq!(alpha >= 128, score > 0.5, "{at}");
-            let as_it_was = if score > 0.5 { 255 } else { 32 };
-            assert!(at % 64 < 32 || alpha == as_it_was, "{at}: {alpha}");
         }
         let first = halved(&alpha, 64);
         let second = halved(&first, 32);
@@ -256,16 +180,13 @@ mod tests {
         };
         let score = |i: u32| if hole(i % 64, i / 64) { 0.1 } else { 0.9 };
         let scores: Vec<f32> = (0..64 * 32).map(score).collect();
-        let survey = survey(&scores, size, [255, 0]);
-        let mut passes = [None; MIPS];
-        passes[1] = Some(survey.least(1, 0.5 * 64.0 * 32.0 / survey.opaque as f32));
-        let rule = Rule {
-            threshold: 0.5,
-            alphas: [255, 0],
-            passes,
-        };
+        let page = page(&scores, size);
+        let mips = means(&page, 0.5);
+        // One texel of 16 is a hole on the left, three are on the right.
+        let mut rule = Rule::of(0.5);
+        rule.passes[1] = Some(0.9 - 0.8 * 2.0 / 16.0);
         let mut alpha = vec![0; scores.len()];
-        fill(&mut alpha, &scores, size, &rule);
+        fill(&mut alpha, &page, &mips, &rule);
         let second = halved(&halved(&alpha, 64), 32);
         assert_eq!(passed(&second), 0.5);
         assert!(

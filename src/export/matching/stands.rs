@@ -4,12 +4,12 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::mips::fill;
-use super::rule::Rule;
+use super::mips::{fill, means};
+use super::rule::{REACH, Rule};
 use crate::export::foliage::Foliage;
 use crate::export::level_scene::{AreaGoal, LevelScene, Sight, WoodSeen};
 use crate::export::surface::Surface;
-use crate::space::raster::{Critical, ScorePage, Scores};
+use crate::space::raster::{Critical, ScorePage, Scores, Texture};
 
 /// Thresholds beyond these leave no texel out, or none in.
 const THRESHOLDS: [f32; 2] = [-0.6, 1.6];
@@ -37,6 +37,8 @@ pub(super) struct Stands<'a> {
     all: Vec<Stand<'a>>,
     /// What decides which texels are opaque.
     page: ScorePage,
+    /// The same for its mips, the finest first, once they are made.
+    mips: Vec<ScorePage>,
 }
 
 impl<'a> Stands<'a> {
@@ -54,6 +56,7 @@ impl<'a> Stands<'a> {
         Self {
             page: ScorePage::new(width, height, score),
             all: trees.iter().map(stand).collect(),
+            mips: Vec::new(),
         }
     }
 
@@ -63,12 +66,15 @@ impl<'a> Stands<'a> {
         of_each.min().unwrap_or(0)
     }
 
-    /// Pixels for a unit of length at such a distance.
-    pub fn pixels(&self, sight: usize) -> f32 {
-        let cameras = self.all.first().map(|s| &s.goal.client[sight].cameras);
-        cameras
-            .and_then(|c| c.first())
-            .map_or(1.0, |camera| camera.pixels)
+    /// What a client makes of a page of so many texels a unit of length at each distance: how often it is halved,
+    /// where a card is seen face on.
+    pub fn halvings(&self, texels: f32) -> Vec<f32> {
+        let Some(first) = self.all.first() else {
+            return Vec::new();
+        };
+        let pixels = |sight: &Sight| sight.cameras.first().map_or(1.0, |camera| camera.pixels);
+        let sights = &first.goal.client[..self.sights()];
+        sights.iter().map(|s| (texels / pixels(s)).log2()).collect()
     }
 
     /// Takes over alpha.
@@ -82,14 +88,15 @@ impl<'a> Stands<'a> {
         self.ratio(area, |goal| &goal.near)
     }
 
-    /// One score a texel.
-    pub fn scores(&self) -> &[f32] {
-        self.page.scores()
+    /// Gives mips scores: how opaque texels are from this threshold on, in the mean. Returns how many mips there are.
+    pub fn make_mips(&mut self, threshold: f32) -> usize {
+        self.mips = means(&self.page, threshold);
+        self.mips.len()
     }
 
     /// Sets alpha by a rule.
     pub fn fill(&mut self, foliage: &mut Foliage, rule: &Rule) {
-        fill(&mut foliage.alpha, self.scores(), foliage.size, rule);
+        fill(&mut foliage.alpha, &self.page, &self.mips, rule);
         self.set_alpha(&foliage.alpha);
     }
 
@@ -113,18 +120,36 @@ impl<'a> Stands<'a> {
     }
 
     /// The threshold at which the area near is the originals' times `part`, and the area over that;
-    /// looked for in a `range` first. Opaque and other texels have these `alphas`.
-    pub fn threshold(&self, alphas: [u8; 2], range: [f32; 2], part: f64) -> (f32, f64) {
+    /// looked for in a `range` first.
+    pub fn threshold(&self, range: [f32; 2], part: f64) -> (f32, f64) {
+        self.threshold_of(&self.page, None, range, part)
+    }
+
+    /// The same where one of the mips is seen alone.
+    pub fn mip_threshold(&self, mip: usize, range: [f32; 2], part: f64) -> f32 {
+        let page = &self.mips[mip];
+        let [width, height] = page.size().map(|s| s as u32);
+        let texture = Texture::from_alpha(width, height, vec![0; page.scores().len()]);
+        self.threshold_of(page, Some(&texture), range, part).0
+    }
+
+    fn threshold_of(
+        &self,
+        page: &ScorePage,
+        texture: Option<&Texture>,
+        range: [f32; 2],
+        part: f64,
+    ) -> (f32, f64) {
         let wanted = part * self.all.iter().map(|s| s.goal.near.area).sum::<f64>();
         let within = |range: [f32; 2]| {
             let scores = Scores {
-                page: &self.page,
-                alphas,
+                page,
+                reach: REACH,
                 range,
             };
             let mut pixels = Critical::default();
             for Stand { level, goal, seen } in &self.all {
-                let own = level.critical(&goal.near.cameras, &seen.near, scores);
+                let own = level.critical(&goal.near.cameras, &seen.near, scores, texture);
                 pixels.above += own.above;
                 pixels.within.extend(own.within);
             }

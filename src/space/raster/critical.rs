@@ -1,9 +1,9 @@
 //! The threshold at which each pixel stops being covered, for all thresholds in one drawing.
 //!
-//! Where the alpha of a texture is 1 above a threshold of some score and a constant elsewhere, a
-//! pixel is covered as long as the threshold is at most a certain value: that of the last texel
-//! which its best fragment needs to pass the alpha test. These values, once known, tell the
-//! covered area at any threshold without drawing again.
+//! Where the alpha of a texture rises evenly with how much some score is above a threshold, a pixel is
+//! covered as long as the threshold is at most a certain value: that at which its best fragment just
+//! passes the alpha test. These values, once known, tell the covered area at any threshold without
+//! drawing again.
 //!
 //! Who knows about where the threshold is asks for a range: pixels above it are as good as opaque,
 //! texels below it as good as holes, and most fragments are passed over.
@@ -16,9 +16,10 @@ use super::seen::{may_reach, seen};
 use super::triangle::CENTER;
 use super::{Camera, Mask, Mips, Sampling, Scene};
 
-/// Scores of the base level's texels, with the highest one of each block of them.
+/// Scores of a page's texels, with the highest one of each block of them.
 #[derive(Clone, Debug)]
 pub struct ScorePage {
+    size: [usize; 2],
     score: Vec<f32>,
     /// Of the block's texels and one more to the right and below: what its samples mix.
     highest: Vec<f32>,
@@ -30,8 +31,8 @@ pub struct ScorePage {
 pub struct Scores<'a> {
     /// The texels' scores.
     pub page: &'a ScorePage,
-    /// Alpha where the score reaches the threshold, and elsewhere.
-    pub alphas: [u8; 2],
+    /// So much above the threshold alpha is full, so much below it there is none, and it is even between.
+    pub reach: f32,
     /// Thresholds between these are told apart.
     pub range: [f32; 2],
 }
@@ -45,8 +46,14 @@ pub struct Critical {
     pub within: Vec<f32>,
 }
 
-/// Half of the range of alpha in the units of texture filtering: the cutoff of 0.5.
-const CUTOFF: u32 = 255 * 65_536 / 2;
+/// Steps towards the threshold at which a sample just passes: each is at least as good as halving what is left.
+const STEPS: usize = 8;
+
+/// Thresholds are told apart by less than this.
+const CLOSE: f32 = 1e-3;
+
+/// What is as near to passing as this passes: sums are rounded.
+const ROUNDING: f32 = 1e-5;
 
 const SAMPLING: Sampling = Sampling {
     side: 1,
@@ -55,7 +62,7 @@ const SAMPLING: Sampling = Sampling {
 
 /// For every pixel that anything can cover the highest threshold at which it is covered, beside what
 /// `covered` covers (the mask of opaque triangles from the same camera, an orthographic one). One
-/// sample a pixel of the base level; materials with a cutoff have one of 0.5 and all use one texture, that of the scores.
+/// sample a pixel of the base level; materials with a cutoff have one of 0.5 and all use one texture, as large as the page of scores.
 pub fn critical(scene: &Scene, camera: &Camera, covered: &Mask, scores: Scores) -> Critical {
     let [floor, ceiling] = scores.range;
     let corners = camera.project(scene.geometry.positions, SAMPLING.side);
@@ -129,10 +136,22 @@ impl ScorePage {
             }
         }
         Self {
+            size: [width, height],
             score,
             highest,
             across,
         }
+    }
+
+    /// Width and height in texels.
+    pub fn size(&self) -> [usize; 2] {
+        self.size
+    }
+
+    /// The score of a texel.
+    #[inline]
+    pub fn score(&self, [x, y]: [usize; 2]) -> f32 {
+        self.score[y * self.size[0] + x]
     }
 
     /// The texels' scores, rows from the top.
@@ -169,33 +188,55 @@ impl Scores<'_> {
 
     /// The highest threshold at which four texels pass the test, if it is above `known`.
     #[inline]
-    fn critical(&self, texels: [usize; 4], weights: [u32; 4], known: f32) -> f32 {
-        let score = &self.page.score;
-        let four: [f32; 4] = texels.map(|t| score[t]);
-        if four.iter().all(|&s| s <= known) {
+    fn critical(&self, texels: [usize; 4], weights: [f32; 4], known: f32) -> f32 {
+        let four: [f32; 4] = texels.map(|t| self.page.score[t]);
+        let highest = four.iter().fold(f32::NEG_INFINITY, |m, &s| m.max(s));
+        if highest <= known {
             return known;
         }
-        let [opaque, other] = self.alphas.map(u32::from);
-        let kept = |i: usize| u32::from(four[i] > f32::NEG_INFINITY) * weights[i];
-        let least: u32 = (0..4).map(kept).sum::<u32>() * other;
-        let mut found = known;
-        // Each score in turn is tried as the threshold: four are too few to sort.
-        for &threshold in four.iter().filter(|&&s| s > known) {
-            let passes = |i: usize| u32::from(four[i] >= threshold) * weights[i];
-            let sum = least + (0..4).map(passes).sum::<u32>() * (opaque - other);
-            if sum >= CUTOFF && threshold > found {
-                found = threshold;
+        // Their alpha at a threshold, over the cutoff: it falls as thresholds rise.
+        let reach = self.reach;
+        let over = |threshold: f32| {
+            let of = |i: usize| weights[i] * (four[i] - threshold).clamp(-reach, reach);
+            of(0) + of(1) + of(2) + of(3)
+        };
+        // Below this all are full, but those that never are.
+        let lowest = four.iter().filter(|s| s.is_finite());
+        let lowest = lowest.fold(highest, |m, &s| m.min(s)) - reach;
+        let (mut low, mut high) = (known.max(lowest), highest);
+        let mut at_low = over(low);
+        if at_low < 0.0 {
+            return known;
+        }
+        let mut at_high = over(high);
+        for _ in 0..STEPS {
+            if high - low < CLOSE || at_high >= -ROUNDING {
+                break;
+            }
+            // Where a line through both ends is 0, and then the middle of what is left.
+            let line = low + (high - low) * at_low / (at_low - at_high);
+            for threshold in [line, 0.5 * (low + high)] {
+                if threshold <= low || threshold >= high {
+                    continue;
+                }
+                match over(threshold) {
+                    passes if passes >= -ROUNDING => (low, at_low) = (threshold, passes),
+                    fails => (high, at_high) = (threshold, fails),
+                }
             }
         }
-        found
+        match at_high >= -ROUNDING {
+            true => high,
+            false => low,
+        }
     }
 }
 
-/// Weights of four texels, of 65,536, for a place within the first one in 256ths.
+/// Weights of four texels, for a place within the first one in 256ths.
 #[inline]
-fn weights([right, below]: [u32; 2]) -> [u32; 4] {
+fn weights([right, below]: [u32; 2]) -> [f32; 4] {
     let (left, above) = (256 - right, 256 - below);
-    [left * above, right * above, left * below, right * below]
+    [left * above, right * above, left * below, right * below].map(|w| w as f32 / 65_536.0)
 }
 
 #[cfg(test)]
@@ -241,7 +282,9 @@ mod tests {
             ..Material::default()
         };
         let camera = Camera::orthographic(Vec3::NEG_Z, Vec3::Y, Vec3::ZERO, 50.0, 110, 110);
-        for alphas in [[255, 0], [255, 90], [150, 0]] {
+        for reach in [0.05, 0.3, 2.0] {
+            let alpha =
+                |above: f32| (127.5 + 127.5 * (above / reach).clamp(-1.0, 1.0)).round() as u8;
             let draw = |alpha: Vec<u8>| {
                 let textures = [Texture::from_alpha(size, size, alpha)];
                 let scene = Scene {
@@ -265,7 +308,7 @@ mod tests {
                 let in_range = |range| {
                     let scores = Scores {
                         page: &page,
-                        alphas,
+                        reach,
                         range,
                     };
                     critical(&scene, &camera, &nothing, scores)
@@ -280,16 +323,24 @@ mod tests {
             for threshold in [-1.0, 0.2, 0.45, 0.5, 0.61, 0.9, 1.1] {
                 let alpha = |i: u32| match score[i as usize] >= threshold {
                     _ if outside(i) => 0,
-                    true => alphas[0],
-                    false => alphas[1],
+                    true => alpha(score[i as usize] - threshold).max(128),
+                    false => alpha(score[i as usize] - threshold).min(127),
                 };
                 let (area, critical, some) = draw((0..size * size).map(alpha).collect());
                 let count = |of: &[f32]| of.iter().filter(|&&c| c >= threshold).count();
                 let counted = count(&critical);
-                assert_eq!(area, counted as f64, "{alphas:?} at {threshold}");
+                // Alpha has whole steps.
+                let close = area * 0.02 + 8.0;
+                assert!(
+                    (area - counted as f64).abs() < close,
+                    "{reach} at {threshold}: {area} {counted}"
+                );
                 if (0.3..0.7).contains(&threshold) {
                     let again = some.above + count(&some.within);
-                    assert_eq!(again, counted, "{alphas:?} at {threshold}");
+                    assert!(
+                        again.abs_diff(counted) < 3,
+                        "{reach} at {threshold}: {again} {counted}"
+                    );
                 }
                 seen.push(counted);
             }
