@@ -82,13 +82,13 @@ impl Block {
     }
 
     /// What may become of its mips, given which of their texels pass: those of `mips`, whose blocks begin here.
-    pub fn join(&mut self, mips: &[ScorePage], [left, top]: [usize; 2], rule: &Rule) {
+    pub fn join(&mut self, mips: &[&ScorePage], [left, top]: [usize; 2], rule: &Rule) {
         for mip in 0..self.halvings {
             let side = self.side(mip);
             let (finer, coarser) = self.spans.split_at_mut(self.starts[mip + 1]);
             let finer = &finer[self.starts[mip]..];
             let asked = rule.passes.get(mip).copied().flatten();
-            let asked = asked.map(|least| (least, &mips[mip]));
+            let asked = asked.map(|least| (least, mips[mip]));
             each_four(side, |at, four| {
                 let mean =
                     |of: fn(&Span) -> f32| four.iter().map(|&i| of(&finer[i])).sum::<f32>() / 4.0;

@@ -14,7 +14,7 @@ use super::rule::{MIPS, Rule};
 use crate::space::raster::ScorePage;
 
 /// Sets alpha from the scores of a page and of its mips.
-pub fn fill(alpha: &mut [u8], page: &ScorePage, mips: &[ScorePage], rule: &Rule) {
+pub fn fill(alpha: &mut [u8], page: &ScorePage, mips: &[&ScorePage], rule: &Rule) {
     let scores = page.scores();
     if rule.passes == [None; MIPS] {
         let texels = alpha.par_iter_mut().zip(scores);
@@ -157,7 +157,7 @@ mod tests {
         let mut rule = Rule::of(0.5);
         rule.passes[2] = Some(between);
         let mut alpha = vec![0; scores.len()];
-        fill(&mut alpha, &page, &mips, &rule);
+        fill(&mut alpha, &page, &mips.iter().collect::<Vec<_>>(), &rule);
         // No texel changes sides.
         for (at, (&alpha, &score)) in alpha.iter().zip(&scores).enumerate() {
             assert_eq!(alpha >= 128, score > 0.5, "{at}");
@@ -186,7 +186,7 @@ mod tests {
         let mut rule = Rule::of(0.5);
         rule.passes[1] = Some(0.9 - 0.8 * 2.0 / 16.0);
         let mut alpha = vec![0; scores.len()];
-        fill(&mut alpha, &page, &mips, &rule);
+        fill(&mut alpha, &page, &mips.iter().collect::<Vec<_>>(), &rule);
         let second = halved(&halved(&alpha, 64), 32);
         assert_eq!(passed(&second), 0.5);
         assert!(

@@ -8,6 +8,7 @@
 mod block;
 mod found;
 mod mips;
+mod pixels;
 mod rounds;
 mod rule;
 mod stands;

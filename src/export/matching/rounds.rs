@@ -19,7 +19,7 @@ use crate::export::foliage::Foliage;
 const ROUNDS: [usize; 2] = [6, 10];
 
 /// Texels that all rounds together go through: the larger the page, the fewer rounds.
-const TEXELS: usize = 3 << 20;
+const TEXELS: usize = 5 << 20;
 
 /// Thresholds are looked for so far around the last ones first.
 const RANGE: f32 = 0.15;
@@ -29,10 +29,15 @@ const PARTS: [f64; 2] = [0.2, 3.0];
 
 /// Least and most part of the way that the base level's area follows its threshold's: blocks that pass in mips
 /// lift their texels next to the cutoff, and outlines swell.
-const FOLLOWS: [f64; 2] = [0.2, 1.0];
+const FOLLOWS: [f64; 2] = [0.2, 2.0];
 
 /// What it is taken for before it is known.
-const FIRST_FOLLOWS: f64 = 0.4;
+const FIRST_FOLLOWS: f64 = 0.3;
+
+/// How much less is asked of the base level at first, for the logarithm of what is missing at twice the distance: about what
+/// outlines will swell by. At most so much.
+const SWELLS: f64 = 0.65;
+const MOST_SWELLS: f64 = 0.5;
 
 /// Most change of the logarithm of what the base level's threshold is asked for.
 const MOST_STEP: f64 = 0.25;
@@ -42,6 +47,9 @@ const DAMPED: f64 = 0.6;
 
 /// A loss that is not worth another round.
 const ENOUGH: f64 = 0.1;
+
+/// Rounds in a row that find nothing better, once one has, before it is left at that.
+const IDLE: usize = 2;
 
 /// Cards that are seen from aside show coarser mips than those that are seen face on, by so many halvings in the mean.
 const ASIDE: f32 = 0.7;
@@ -75,14 +83,15 @@ pub fn match_mips(stands: &mut Stands, foliage: &mut Foliage, found: &mut Matche
         return;
     }
     let seen = seen(&halvings, stands.make_mips(found.threshold));
-    let mut asked = Asked::new(found.threshold);
+    let mut asked = Asked::new(found);
     let [least, most] = ROUNDS;
+    let mut idle = 0;
     for round in 0..(TEXELS / foliage.alpha.len().max(1)).clamp(least, most) {
         if round > 0 {
             asked.change(found, &halvings);
-            let range = [found.threshold - RANGE, found.threshold + RANGE];
-            (found.threshold, _) = stands.threshold(range, asked.near.exp());
         }
+        let range = [found.threshold - RANGE, found.threshold + RANGE];
+        (found.threshold, _) = stands.threshold(range, asked.near.exp());
         let rule = asked.rule(stands, found.threshold, seen.clone());
         stands.fill(foliage, &rule);
         found.near_ratio = stands.near_ratio();
@@ -91,8 +100,11 @@ pub fn match_mips(stands: &mut Stands, foliage: &mut Foliage, found: &mut Matche
         if loss < best.loss {
             let found = found.clone();
             best = Tried { rule, found, loss };
+            idle = 0;
+        } else if best.rule.passes != [None; MIPS] {
+            idle += 1;
         }
-        if loss < ENOUGH {
+        if loss < ENOUGH || idle == IDLE {
             break;
         }
     }
@@ -130,18 +142,23 @@ struct Asked {
 }
 
 impl Asked {
-    fn new(threshold: f32) -> Self {
+    /// Of what is found where no mip asks for anything.
+    fn new(found: &Matched) -> Self {
+        let missing = found
+            .ratios
+            .last()
+            .map_or(0.0, |ratio| ratio.clamp(0.1, 10.0).ln());
         Self {
-            near: 0.0,
+            near: (SWELLS * missing).clamp(-MOST_SWELLS, 0.0),
             parts: [1.0; MIPS],
-            thresholds: [threshold; MIPS],
+            thresholds: [found.threshold; MIPS],
             follows: FIRST_FOLLOWS,
             before: None,
         }
     }
 
     /// What these thresholds lead to for the mips that are seen.
-    fn rule(&mut self, stands: &Stands, threshold: f32, seen: Range<usize>) -> Rule {
+    fn rule(&mut self, stands: &mut Stands, threshold: f32, seen: Range<usize>) -> Rule {
         let mut rule = Rule::of(threshold);
         for mip in seen {
             let last = self.thresholds[mip];
