@@ -4,8 +4,6 @@
 //! (metres by the glTF specification), unless a name says otherwise. [`VERSION`] grows when a
 //! reader of the old form would misread the new one; keys may be added without.
 
-use std::path::Path;
-
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use serde::{Deserialize, Serialize};
@@ -255,19 +253,6 @@ impl Manifest {
             what: e.to_string(),
         })?;
         Ok(text + "\n")
-    }
-
-    /// The files that a manifest of any version lists; `None` where it is none of ours.
-    pub fn files_of(file: &Path) -> Option<Vec<String>> {
-        #[derive(Deserialize)]
-        struct Owned {
-            format: String,
-            files: Vec<String>,
-        }
-        let owned: Owned = ron::from_str(&std::fs::read_to_string(file).ok()?).ok()?;
-        // A name is a file in this folder, never a path out of it.
-        let plain = |n: &String| !n.contains(['/', '\\']) && n != "..";
-        (owned.format == FORMAT).then(|| owned.files.into_iter().filter(plain).collect())
     }
 }
 

@@ -18,6 +18,7 @@ pub mod level_scene;
 pub mod manifest;
 mod manifest_check;
 mod manifest_cuts;
+mod manifest_files;
 pub mod manifest_tiles;
 pub mod maps;
 pub mod matching;

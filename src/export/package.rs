@@ -8,7 +8,8 @@ use std::path::{Path, PathBuf};
 
 use super::exchange::exchange;
 use super::leftovers;
-use super::manifest::{self, Manifest};
+use super::manifest;
+use super::manifest_files::files_of;
 use crate::error::{Error, Result};
 
 /// A package that is being written; dropped before [`Package::commit`], it leaves no trace.
@@ -202,7 +203,7 @@ fn replaced(output: &Path, force: bool) -> Result<Vec<String>> {
         empty = false;
         let name = entry.file_name().to_string_lossy().into_owned();
         if name.ends_with(manifest::SUFFIX)
-            && let Some(owned) = Manifest::files_of(&entry.path())
+            && let Some(owned) = files_of(&entry.path())
         {
             files.extend(owned);
         }

@@ -42,7 +42,8 @@ const MOST_SWELLS: f64 = 0.5;
 /// Most change of the logarithm of what the base level's threshold is asked for.
 const MOST_STEP: f64 = 0.25;
 
-/// The part of the way that mips are asked to go at a time: all of them move the same areas.
+/// The part of the way that mips are asked to go at a time: all of them move the same areas. The whole way at a time, third levels of
+/// six trees get nearer to their area where they start (.047 off instead of .076), and lose .008 more of F1.
 const DAMPED: f64 = 0.6;
 
 /// A loss that is not worth another round.
