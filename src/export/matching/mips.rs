@@ -45,26 +45,37 @@ fn halvings([width, height]: [usize; 2]) -> usize {
 /// The scores of a page's mips, the finest first: how opaque blocks of texels are in the mean, of which one is half
 /// opaque where its score is this threshold. Texels of no chart don't count.
 pub fn means(page: &ScorePage, threshold: f32) -> Vec<ScorePage> {
-    let opacity = |&score: &f32| match score > f32::NEG_INFINITY {
+    let opacity = |score: f32| match score > f32::NEG_INFINITY {
         true => (score - threshold + 0.5).clamp(0.0, 1.0),
         false => score,
     };
-    let mut finer: Vec<f32> = page.scores().par_iter().map(opacity).collect();
     let [mut width, mut height] = page.size();
-    let mut mips = Vec::new();
+    let mut mips: Vec<ScorePage> = Vec::new();
     for _ in 0..halvings(page.size()).min(MIPS) {
-        let halved = |rows: &[f32]| {
-            let two = rows.split_at(width);
-            let pairs = two.0.chunks_exact(2).zip(two.1.chunks_exact(2));
-            let four = pairs.map(|(a, b)| mean([a[0], a[1], b[0], b[1]]));
-            four.collect::<Vec<f32>>()
+        let scores = match mips.last() {
+            Some(mip) => coarser(mip.scores(), width, |score| score),
+            // Of the page itself no opacities are kept: it is the largest.
+            None => coarser(page.scores(), width, opacity),
         };
-        let halves: Vec<Vec<f32>> = finer.par_chunks_exact(2 * width).map(halved).collect();
-        finer = halves.concat();
         (width, height) = (width / 2, height / 2);
-        mips.push(ScorePage::new(width as u32, height as u32, finer.clone()));
+        mips.push(ScorePage::new(width as u32, height as u32, scores));
     }
     mips
+}
+
+/// The means of blocks of 2 x 2 texels of rows of so many, of each what `of` makes of it.
+fn coarser(scores: &[f32], width: usize, of: impl Fn(f32) -> f32 + Sync) -> Vec<f32> {
+    let mut out = vec![0.0; scores.len() / 4];
+    let rows = out.par_chunks_exact_mut(width / 2);
+    rows.zip(scores.par_chunks_exact(2 * width))
+        .for_each(|(out, two)| {
+            let (above, below) = two.split_at(width);
+            let pairs = above.chunks_exact(2).zip(below.chunks_exact(2));
+            for (out, (a, b)) in out.iter_mut().zip(pairs) {
+                *out = mean([a[0], a[1], b[0], b[1]].map(&of));
+            }
+        });
+    out
 }
 
 /// Of those that are of a chart.
