@@ -1,7 +1,7 @@
 //! The bake: every step in order, one line each. Read this first.
 
 use crate::beside::{alone, hierarchy, instanced, told};
-use crate::botany::load::load;
+use crate::botany::load::load_base_colors;
 use crate::botany::portrait;
 use crate::botany::tree::Tree;
 use crate::detail::optimal_cut::Candidate;
@@ -253,8 +253,7 @@ fn levels(
 pub fn read_back(package: &Package, packed: &[Packed], rungs: &[Rung]) -> Result<Vec<Judged>> {
     let read = |(level, rung): (&Packed, &Rung)| {
         let file = format!("{}.glb", level.name);
-        let mut model = load(&package.file(&file))?;
-        model.keep_only_base_colors();
+        let model = load_base_colors(&package.file(&file))?;
         Ok(Judged {
             model,
             file,

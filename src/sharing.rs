@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use crate::botany::load::{Limits, load_slice};
+use crate::botany::load::{Limits, base_colors_of};
 use crate::botany::model::Model;
 use crate::error::Result;
 use crate::export::chart::Shape;
@@ -59,9 +59,8 @@ impl<'a> Ruler<'a> {
         let pngs = encode_images(&level.scene)?;
         let frame = &self.original.frame;
         let bytes = write_glb("level", &level.scene, &pngs, frame, Value::Null)?;
-        let mut model = load_slice(&bytes, Path::new("level.glb"), &Limits::default())?;
+        let model = base_colors_of(&bytes, Path::new("level.glb"), &Limits::default())?;
         let texture_bytes = texture_bytes(&model);
-        model.keep_only_base_colors();
         let mut known = self.references.iter();
         let reference = known.find(|r| r.height_px() == height_px);
         let figures = reference.map(|r| r.compare(&model));

@@ -9,7 +9,7 @@ use crate::botany::model::Image;
 use crate::botany::tree::Tree;
 use crate::error::{Error, Result};
 use crate::export::combined::{Packed, write_combined};
-use crate::export::gltf::write_glb;
+use crate::export::gltf::glb;
 use crate::export::manifest::SUFFIX;
 use crate::export::package::Package;
 use crate::export::png::encode_png;
@@ -49,8 +49,8 @@ pub fn write(
     for level in packed.iter().filter(|level| level.shown) {
         let file = format!("{}.glb", level.name);
         let extras: Value = level.extras.clone();
-        let bytes = write_glb(&level.name, &level.scene, &level.pngs, frame, extras)?;
-        package.write(&file, &bytes)?;
+        let glb = glb(&level.name, &level.scene, &level.pngs, frame, extras)?;
+        package.write_pieces(&file, glb.pieces())?;
         files.push(file);
         if scene.mips == Mips::Shipped {
             ship(package, level, scene.texture_format, &mut files)?;
@@ -58,7 +58,7 @@ pub fn write(
         step(watch)?;
     }
     let all = format!("{}.glb", tree.model.name);
-    package.write(&all, &write_combined(packed, frame)?)?;
+    package.write_pieces(&all, write_combined(packed, frame)?.pieces())?;
     files.extend([all, "report.json".into(), tree.model.name.clone() + SUFFIX]);
     step(watch)?;
     Ok(files)

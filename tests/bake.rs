@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use glam::Vec3;
-use pleach::botany::load::load;
+use pleach::botany::load::{load, load_base_colors};
 use pleach::export::manifest::Manifest;
 use pleach::report::schema::Report;
 use pleach::space::glb::GlbBuilder;
@@ -201,6 +201,21 @@ fn a_package_is_complete_and_says_what_it_holds() {
     for level in &report.levels {
         let model = load(&folder.join(&level.file)).unwrap();
         assert_eq!(level.triangles, model.triangles.len() as u64);
+        let base = load_base_colors(&folder.join(&level.file)).unwrap();
+        assert_eq!(base.materials, model.materials);
+        let is_base = |i| {
+            base.materials
+                .iter()
+                .any(|m| m.base_color.is_some_and(|t| t.image == i))
+        };
+        for (i, (all, some)) in (0..).zip(model.images.iter().zip(&base.images)) {
+            assert_eq!(
+                (&some.name, some.width, some.height),
+                (&all.name, all.width, all.height)
+            );
+            let texels: &[u8] = if is_base(i) { &all.rgba } else { &[] };
+            assert!(**some.rgba == *texels && !all.rgba.is_empty());
+        }
         assert!(level.sizes[0].views.len() >= 16);
         assert!(level.sizes[0].views.iter().any(|v| v.view == "top"));
     }

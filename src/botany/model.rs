@@ -251,18 +251,6 @@ impl Model {
         self.images = kept;
     }
 
-    /// Forgets the pixels of images that are no base colour: enough to measure silhouettes and
-    /// costs. Sizes stay.
-    pub fn keep_only_base_colors(&mut self) {
-        let mut kept = vec![false; self.images.len()];
-        for texture in self.materials.iter().filter_map(|m| m.base_color) {
-            kept[texture.image as usize] = true;
-        }
-        for (image, _) in self.images.iter_mut().zip(kept).filter(|(_, kept)| !kept) {
-            image.rgba = Arc::default();
-        }
-    }
-
     /// Height of the tree (extent along y) in normalised units; a quarter of the diameter for what
     /// is flatter than that, such as leaves on the ground: sizes on the screen are stated by it.
     pub fn height(&self) -> f32 {

@@ -12,6 +12,7 @@ use super::surface::Scene;
 use crate::botany::model::Frame;
 use crate::error::Result;
 use crate::scene;
+use crate::space::glb::Glb;
 
 /// A level that is ready to be written.
 #[derive(Clone, Debug)]
@@ -39,15 +40,15 @@ impl Packed {
 }
 
 /// Writes all levels that are shown, nearest first, into one GLB.
-pub fn write_combined(levels: &[Packed], frame: &Frame) -> Result<Vec<u8>> {
+pub fn write_combined<'b>(levels: &'b [Packed], frame: &Frame) -> Result<Glb<'b>> {
     let levels: Vec<&Packed> = levels.iter().filter(|l| l.shown).collect();
-    let mut file = FileBuilder::for_scenes(levels.iter().map(|l| (&l.scene, &l.pngs[..])));
+    let mut file = FileBuilder::for_scenes(levels.iter().map(|l| &l.scene));
     let meshes = levels
         .iter()
         .map(|l| file.mesh(&l.name, &l.scene, &l.pngs))
         .collect::<Result<Vec<usize>>>()?;
     let first = wired(&mut file, &levels, &meshes, frame);
-    file.finish(vec![first])
+    file.finish_in_pieces(vec![first])
 }
 
 /// A tree of a species with its levels, nearest first.

@@ -220,21 +220,31 @@ impl Foliage {
 
     /// The images that [`Maps`] names. They are what the texels were: these are no more.
     pub fn take_images(&mut self) -> Vec<Image> {
-        let mut texels = std::mem::take(&mut self.texels);
-        let page = |(number, name): (usize, &&str)| {
-            let rgba = match number {
-                0 => texels.take_colors(&std::mem::take(&mut self.alpha)),
-                1 => texels.take_normals(),
-                _ => texels.take_orms(),
-            };
-            Image {
-                name: (*name).into(),
-                width: self.size[0],
-                height: self.size[1],
-                rgba: Arc::new(rgba),
-            }
+        (0..self.maps.count()).map(|n| self.take(n)).collect()
+    }
+
+    /// The first one of [`take_images`](Self::take_images): base colour with alpha.
+    pub fn take_page(&mut self) -> Image {
+        self.take(0)
+    }
+
+    /// The others.
+    pub fn take_light(&mut self) -> impl Iterator<Item = Image> {
+        (1..self.maps.count()).map(|n| self.take(n))
+    }
+
+    fn take(&mut self, number: usize) -> Image {
+        let rgba = match number {
+            0 => self.texels.take_colors(&std::mem::take(&mut self.alpha)),
+            1 => self.texels.take_normals(),
+            _ => self.texels.take_orms(),
         };
-        self.maps.names().iter().enumerate().map(page).collect()
+        Image {
+            name: self.maps.names()[number].into(),
+            width: self.size[0],
+            height: self.size[1],
+            rgba: Arc::new(rgba),
+        }
     }
 }
 

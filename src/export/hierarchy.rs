@@ -167,11 +167,11 @@ fn add_billboards(
     };
     let with_cards = scenes.iter().any(|s| s.2);
     let shared = match with_cards {
-        true => file.materials(&page_scene, &encode_images(&page_scene)?),
+        true => file.materials(&page_scene, encode_images(&page_scene)?),
         false => Vec::new(),
     };
     for (tile, mut scene, carded) in scenes {
-        let mut numbers = file.materials(&scene, &encode_images(&scene)?);
+        let mut numbers = file.materials(&scene, encode_images(&scene)?);
         if carded {
             numbers.extend(&shared);
             scene.materials.extend(page_scene.materials.iter().cloned());

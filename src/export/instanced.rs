@@ -47,7 +47,7 @@ pub fn write_instanced(
     let as_nodes = copies <= recipe.instance_nodes as usize;
 
     let mut file = FileBuilder::default();
-    let numbers = file.materials(&scene, &encode_images(&scene)?);
+    let numbers = file.materials(&scene, encode_images(&scene)?);
     let mut children = Vec::new();
     if !rest.is_empty() {
         let surfaces = &scene.surfaces[ranges[0].clone()];

@@ -4,6 +4,8 @@
 //! that fails or is stopped leaves what was there before. Files in the output folder that are not
 //! the package's own are never removed.
 
+use std::fs::File;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use super::exchange::exchange;
@@ -72,8 +74,21 @@ impl Package {
     /// # Errors
     /// [`Error::Io`].
     pub fn write(&self, name: &str, bytes: &[u8]) -> Result<()> {
-        let file = self.draft.join(name);
-        std::fs::write(&file, bytes).map_err(|e| Error::io(&self.output.join(name), "write", e))
+        self.write_pieces(name, [bytes].into_iter())
+    }
+
+    /// Writes one file: pieces that follow each other.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn write_pieces<'p>(
+        &self,
+        name: &str,
+        mut pieces: impl Iterator<Item = &'p [u8]>,
+    ) -> Result<()> {
+        let written = File::create(self.draft.join(name))
+            .and_then(|mut file| pieces.try_for_each(|piece| file.write_all(piece)));
+        written.map_err(|e| Error::io(&self.output.join(name), "write", e))
     }
 
     /// Writes a file beside the package's folder, named after it; returns where. It stays.

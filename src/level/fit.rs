@@ -253,24 +253,27 @@ impl Fitted {
             .fold(f64::MAX, f64::min)
     }
 
-    /// Bleeds the texels and joins wood and cards.
-    pub(super) fn level(mut self, original: &Original) -> Level {
+    /// Bleeds the texels and joins wood and cards. Of the cards' images only the base colours are there yet: the others are
+    /// still the page's texels.
+    pub(super) fn level(mut self, original: &Original) -> (Level, Foliage) {
         self.foliage.add_backs(gap(original, self.request));
         self.foliage.bleed();
         let surface = self.foliage.surface(0..self.foliage.charts.len());
         let (maps, double_sided) = (self.foliage.maps, !self.plan.one_sided);
         let material = |first: u32| maps.material(first, double_sided);
-        Level {
-            scene: on_page(self.wood, surface, self.foliage.take_images(), material),
+        let page = vec![self.foliage.take_page()];
+        let level = Level {
+            scene: on_page(self.wood, surface, page, material),
             request: self.request,
             plan: self.plan,
             matched: self.matched,
-            charts: self.foliage.charts,
+            charts: std::mem::take(&mut self.foliage.charts),
             atlas: self.foliage.size,
             density: self.density,
             farthest_copy: 0.0,
             shared: Vec::new(),
-        }
+        };
+        (level, self.foliage)
     }
 
     /// What the fit wants of each texel, 0 transparent and 1 opaque; where the level was fitted for sharing.

@@ -37,7 +37,10 @@ impl Baker<'_> {
 
     /// The level on a page of its own.
     pub fn alone(&self, fitted: Fitted) -> Level {
-        let level = self.toned(fitted.level(self.original));
+        let (level, mut page) = fitted.level(self.original);
+        // All images beside all that colours are compared by are the most that a bake ever holds.
+        let mut level = self.toned(level);
+        level.scene.images.extend(page.take_light());
         level.with_coarser_light(self.recipe.own_light_halvings())
     }
 

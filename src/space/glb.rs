@@ -1,16 +1,39 @@
 //! Writes binary glTF 2.0 containers: JSON beside one buffer of views, accessors and images.
 
+use std::borrow::Cow;
+
 use glam::{Vec2, Vec3};
 use serde_json::{Value, json};
 
 /// Collects buffer views, accessors and the objects that refer to them, then writes a GLB.
 ///
-/// The JSON keeps the order of insertion, so the same calls give the same bytes.
+/// The JSON keeps the order of insertion, so the same calls give the same bytes. Images may stay where they are until the
+/// file is written: those of all levels are as large as the file.
 #[derive(Default)]
-pub struct GlbBuilder {
-    binary: Vec<u8>,
+pub struct GlbBuilder<'b> {
+    /// The buffer; each begins at a multiple of four bytes.
+    pieces: Vec<Cow<'b, [u8]>>,
+    /// Length of all of them.
+    bytes: usize,
+    /// What own pieces may still take.
+    room: usize,
     views: Vec<Value>,
     accessors: Vec<Value>,
+}
+
+/// A container in pieces: its bytes are theirs, one after the other.
+pub struct Glb<'b>(Vec<Cow<'b, [u8]>>);
+
+impl Glb<'_> {
+    /// The pieces.
+    pub fn pieces(&self) -> impl Iterator<Item = &[u8]> {
+        self.0.iter().map(|piece| &piece[..])
+    }
+
+    /// All in one.
+    pub fn into_bytes(self) -> Vec<u8> {
+        self.0.concat()
+    }
 }
 
 const ARRAY_BUFFER: u32 = 34962;
@@ -19,31 +42,53 @@ const FLOAT: u32 = 5126;
 const UNSIGNED_INT: u32 = 5125;
 const UNSIGNED_SHORT: u32 = 5123;
 
-impl GlbBuilder {
-    /// As an empty one, with room for so many bytes of views.
-    pub fn with_capacity(bytes: usize) -> Self {
+impl<'b> GlbBuilder<'b> {
+    /// As an empty one, with room for so many bytes of its own.
+    pub fn with_capacity(room: usize) -> Self {
         Self {
-            binary: Vec::with_capacity(bytes),
+            room,
             ..Self::default()
         }
     }
 
     /// Bytes of all views so far.
     pub fn bytes(&self) -> usize {
-        self.binary.len()
+        self.bytes
+    }
+
+    /// The piece that takes what is added next.
+    fn own(&mut self) -> &mut Vec<u8> {
+        if !matches!(self.pieces.last(), Some(Cow::Owned(_))) {
+            self.pieces.push(Cow::Owned(Vec::with_capacity(self.room)));
+        }
+        let last = self.pieces.len() - 1;
+        self.pieces[last].to_mut()
+    }
+
+    /// As [`view`](Self::view), of bytes that stay where they are.
+    pub fn view_of(&mut self, bytes: Cow<'b, [u8]>, target: Option<u32>) -> usize {
+        let offset = self.bytes;
+        self.bytes += bytes.len();
+        self.pieces.push(bytes);
+        self.view_from(offset, target)
     }
 
     /// Adds bytes as a buffer view, aligned to four bytes, and returns its index.
     pub fn view(&mut self, bytes: &[u8], target: Option<u32>) -> usize {
-        let offset = self.binary.len();
-        self.binary.extend_from_slice(bytes);
+        let offset = self.bytes;
+        self.own().extend_from_slice(bytes);
+        self.bytes += bytes.len();
         self.view_from(offset, target)
     }
 
     /// Makes all bytes from an offset on a view.
     fn view_from(&mut self, offset: usize, target: Option<u32>) -> usize {
-        let length = self.binary.len() - offset;
-        self.binary.resize(self.binary.len().next_multiple_of(4), 0);
+        let length = self.bytes - offset;
+        let odd = self.bytes.next_multiple_of(4) - self.bytes;
+        if odd > 0 {
+            self.own().extend(&[0; 4][..odd]);
+            self.bytes += odd;
+        }
         let mut view = json!({ "buffer": 0, "byteOffset": offset, "byteLength": length });
         if let Some(target) = target {
             view["target"] = json!(target);
@@ -103,11 +148,14 @@ impl GlbBuilder {
         count: usize,
         target: u32,
     ) -> usize {
-        let offset = self.binary.len();
-        self.binary.reserve(values.len() * BYTES * NUMBERS);
+        let (offset, length) = (self.bytes, values.len() * BYTES * NUMBERS);
+        let own = self.own();
+        own.reserve(length);
         for value in values {
-            self.binary.extend_from_slice(value.as_flattened());
+            own.extend_from_slice(value.as_flattened());
         }
+        self.bytes += length;
+        self.room = self.room.saturating_sub(length);
         let view = self.view_from(offset, Some(target));
         self.accessors.push(json!({
             "bufferView": view, "componentType": kind, "count": count, "type": shape,
@@ -117,9 +165,14 @@ impl GlbBuilder {
 
     /// Puts buffers, views and accessors into `root` (an object with "asset", "nodes", ...) and
     /// returns the whole file.
-    pub fn finish(self, mut root: Value) -> Vec<u8> {
-        if !self.binary.is_empty() {
-            root["buffers"] = json!([{ "byteLength": self.binary.len() }]);
+    pub fn finish(self, root: Value) -> Vec<u8> {
+        self.finish_in_pieces(root).into_bytes()
+    }
+
+    /// As [`finish`](Self::finish), with what stays where it is.
+    pub fn finish_in_pieces(self, mut root: Value) -> Glb<'b> {
+        if self.bytes > 0 {
+            root["buffers"] = json!([{ "byteLength": self.bytes }]);
             root["bufferViews"] = Value::Array(self.views);
         }
         if !self.accessors.is_empty() {
@@ -127,8 +180,7 @@ impl GlbBuilder {
         }
         let mut text = root.to_string().into_bytes();
         text.resize(text.len().next_multiple_of(4), b' ');
-        let binary = self.binary.len();
-        let total = 20 + text.len() + if binary > 0 { 8 + binary } else { 0 };
+        let total = 20 + text.len() + if self.bytes > 0 { 8 + self.bytes } else { 0 };
         let mut head = Vec::with_capacity(28 + text.len());
         head.extend_from_slice(b"glTF");
         head.extend_from_slice(&2u32.to_le_bytes());
@@ -136,13 +188,40 @@ impl GlbBuilder {
         head.extend_from_slice(&(text.len() as u32).to_le_bytes());
         head.extend_from_slice(b"JSON");
         head.extend_from_slice(&text);
-        if binary > 0 {
-            head.extend_from_slice(&(binary as u32).to_le_bytes());
+        if self.bytes > 0 {
+            head.extend_from_slice(&(self.bytes as u32).to_le_bytes());
             head.extend_from_slice(b"BIN\0");
         }
-        // Moved up in place: a second copy would be as large as the file.
-        let mut out = self.binary;
-        out.splice(0..0, head);
-        out
+        let head = [Cow::Owned(head)].into_iter();
+        Glb(head.chain(self.pieces).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_stays_where_it_is_lies_in_the_file_as_what_was_copied() {
+        let (image, points) = ([7u8, 8, 9, 10, 11], [Vec3::X, Vec3::Y]);
+        let file = |add: &dyn Fn(&mut GlbBuilder<'static>)| {
+            let mut glb = GlbBuilder::with_capacity(1);
+            glb.positions(&points);
+            add(&mut glb);
+            glb.vec3(&points);
+            assert_eq!(glb.bytes(), 24 + 8 + 24);
+            glb.finish_in_pieces(json!({ "asset": { "version": "2.0" } }))
+        };
+        let copied = file(&|glb| assert_eq!(glb.view(&image, None), 1)).into_bytes();
+        let kept = file(&|glb| {
+            const IMAGE: &[u8] = &[7, 8, 9, 10, 11];
+            assert_eq!(glb.view_of(IMAGE.into(), None), 1);
+        });
+        assert_eq!(kept.pieces().count(), 4);
+        assert_eq!(kept.into_bytes(), copied);
+        let length = u32::from_le_bytes([copied[8], copied[9], copied[10], copied[11]]);
+        assert_eq!(length as usize, copied.len());
+        let end = &copied[copied.len() - 24 - 8..][..8];
+        assert_eq!(end, [7, 8, 9, 10, 11, 0, 0, 0]);
     }
 }

@@ -24,7 +24,7 @@ pub(super) type Leaves = (Vec<Placement>, Mesh, Option<Painted>);
 /// The file under construction.
 #[derive(Default)]
 struct Parts {
-    glb: GlbBuilder,
+    glb: GlbBuilder<'static>,
     meshes: Vec<Value>,
     nodes: Vec<Value>,
 }

@@ -9,6 +9,7 @@ use rayon::prelude::*;
 
 use super::buffer::{Asset, BROKEN};
 use super::json::{Texture, TextureSource};
+use super::material::Materials;
 use super::uri;
 use crate::botany::model::Image;
 use crate::{Error, Result};
@@ -63,12 +64,27 @@ fn judge(asset: &Asset, index: usize, place: &str) -> Result<Support> {
     })
 }
 
-/// Decodes the images with these indices, in this order; adds external bytes to `file_bytes`.
+/// Of which images texels are read; of the others only sizes are.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Texels {
+    /// All that materials use.
+    All,
+    /// Those that are a material's base colour.
+    OfBaseColors,
+}
+
+/// Decodes the images of some materials, in their order; adds external bytes to `file_bytes`.
 pub(super) fn decode_all(
     asset: &Asset,
-    indices: &[usize],
+    materials: &Materials,
+    texels: Texels,
     file_bytes: &mut u64,
 ) -> Result<Vec<Image>> {
+    let indices = &materials.images;
+    let mut wanted = vec![texels == Texels::All; indices.len()];
+    for texture in materials.list.iter().filter_map(|m| m.base_color) {
+        wanted[texture.image as usize] = true;
+    }
     // 1. Bytes and dimensions, in order, so that the limit is judged before anything is decoded.
     let mut pixels_left = asset.limits.pixels;
     let mut jobs = Vec::with_capacity(indices.len());
@@ -90,13 +106,23 @@ pub(super) fn decode_all(
             ));
         }
         pixels_left -= pixels;
-        jobs.push((index, place, bytes, format, pixels));
+        jobs.push((index, place, bytes, format, [width, height]));
     }
     // 2. Texels, on all threads; the collected order is that of the list.
     jobs.par_iter()
-        .map(|(index, place, bytes, format, pixels)| {
-            let mut image =
-                decode(bytes, *format, *pixels).map_err(|what| broken(asset, place, what))?;
+        .zip(wanted)
+        .map(|((index, place, bytes, format, [width, height]), wanted)| {
+            let pixels = u64::from(*width) * u64::from(*height);
+            let mut image = match wanted {
+                true => {
+                    decode(bytes, *format, pixels).map_err(|what| broken(asset, place, what))?
+                }
+                false => Image {
+                    width: *width,
+                    height: *height,
+                    ..Image::default()
+                },
+            };
             image.name = name(asset, *index);
             Ok(image)
         })

@@ -42,6 +42,7 @@ use glam::DMat4;
 use super::model::Model;
 use crate::{Error, Result};
 use buffer::Asset;
+use image::Texels;
 use warning::Warnings;
 
 /// How large an input may be; beyond it, [`load_with`] ends with an error that names the limit.
@@ -78,6 +79,23 @@ impl Default for Limits {
 /// [`Error::Io`] where a file can't be read, [`Error::Input`] where its content can't be used.
 pub fn load(path: &Path) -> Result<Model> {
     load_with(path, &Limits::default())
+}
+
+/// As [`load`], but of images that are no material's base colour only the sizes: enough to measure silhouettes and costs.
+///
+/// # Errors
+/// As [`load`].
+pub fn load_base_colors(path: &Path) -> Result<Model> {
+    let limits = Limits::default();
+    base_colors_of(&read(path, &limits)?, path, &limits)
+}
+
+/// As [`load_slice`], of what [`load_base_colors`] reads.
+///
+/// # Errors
+/// As [`load`].
+pub fn base_colors_of(bytes: &[u8], path: &Path, limits: &Limits) -> Result<Model> {
+    model(bytes, path, limits, Texels::OfBaseColors)
 }
 
 /// Reads a .glb or .gltf file within the given limits.
@@ -125,6 +143,10 @@ pub fn references(bytes: &[u8], path: &Path, limits: &Limits) -> Result<Vec<(Str
 /// # Errors
 /// As [`load`].
 pub fn load_slice(bytes: &[u8], path: &Path, limits: &Limits) -> Result<Model> {
+    model(bytes, path, limits, Texels::All)
+}
+
+fn model(bytes: &[u8], path: &Path, limits: &Limits, texels: Texels) -> Result<Model> {
     let (document, chunk) = container::open(bytes, path, limits)?;
     let mut warnings = Warnings::default();
     container::check_extensions(&document, path, &mut warnings)?;
@@ -136,7 +158,7 @@ pub fn load_slice(bytes: &[u8], path: &Path, limits: &Limits) -> Result<Model> {
     ground::drop_ground(&placements, &mut parts, &mut warnings);
     let mut model = normalise::assemble(&asset, placements, parts, &mut warnings)?;
     let mut file_bytes = asset.file_bytes;
-    model.images = image::decode_all(&asset, &materials.images, &mut file_bytes)?;
+    model.images = image::decode_all(&asset, &materials, texels, &mut file_bytes)?;
     model.materials = std::mem::take(&mut materials.list);
     unseen::drop_unseen(&asset, &mut model, &mut warnings)?;
     let copies = copies::drop_copies(&mut model);

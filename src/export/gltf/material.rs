@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use super::{FileBuilder, find_or_push};
 use crate::botany::model::{AlphaMode, Material, TextureRef, Wrap};
 
-impl FileBuilder {
+impl FileBuilder<'_> {
     fn texture(&mut self, texture: TextureRef, images: &[usize]) -> Value {
         let wrap = texture.wrap.map(|w| match w {
             Wrap::Repeat => 10497,

@@ -5,6 +5,8 @@
 
 mod material;
 
+use std::borrow::Cow;
+
 use glam::Vec3;
 use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, utf8_percent_encode};
 use serde_json::{Map, Value, json};
@@ -14,7 +16,7 @@ use super::surface::{Scene, Surface, textures_of};
 use super::tangent::tangents;
 use crate::botany::model::{Frame, Material};
 use crate::error::{Error, Result};
-use crate::space::glb::GlbBuilder;
+use crate::space::glb::{Glb, GlbBuilder};
 use crate::space::sha256::sha256;
 
 /// Writes `scene` with its encoded images as a GLB named `name`; `extras` go on the root node.
@@ -25,10 +27,21 @@ pub fn write_glb(
     frame: &Frame,
     extras: Value,
 ) -> Result<Vec<u8>> {
-    let mut file = FileBuilder::for_scenes([(scene, pngs)].into_iter());
+    glb(name, scene, pngs, frame, extras).map(Glb::into_bytes)
+}
+
+/// As [`write_glb`], with images where they are.
+pub fn glb<'b>(
+    name: &str,
+    scene: &Scene,
+    pngs: &'b [Vec<u8>],
+    frame: &Frame,
+    extras: Value,
+) -> Result<Glb<'b>> {
+    let mut file = FileBuilder::for_scenes([scene].into_iter());
     let mesh = file.mesh(name, scene, pngs)?;
     let node = file.node(name, mesh, frame, extras);
-    file.finish(vec![node])
+    file.finish_in_pieces(vec![node])
 }
 
 /// Writes `scene` as [`write_glb`] does, with images in files of their own (`uris`).
@@ -47,8 +60,8 @@ pub fn write_linked(
 
 /// Collects what goes into one file; several levels may share it.
 #[derive(Default)]
-pub struct FileBuilder {
-    glb: GlbBuilder,
+pub struct FileBuilder<'b> {
+    glb: GlbBuilder<'b>,
     meshes: Vec<Value>,
     /// Nodes in order; `MSFT_lod` is wired by the caller through [`Self::node_mut`].
     nodes: Vec<Value>,
@@ -63,25 +76,19 @@ pub struct FileBuilder {
     required: Vec<&'static str>,
 }
 
-/// Room for a file's JSON, bytes: as much as a level with a few materials takes.
-const JSON: usize = 1 << 14;
-
-impl FileBuilder {
-    /// As an empty one, with room for scenes and their images: files of large trees are not copied while they grow.
-    pub fn for_scenes<'s>(scenes: impl Iterator<Item = (&'s Scene, &'s [Vec<u8>])>) -> Self {
-        let bytes = scenes.map(|(scene, pngs)| {
-            let surfaces = scene.surfaces.iter().map(Surface::bytes).sum::<usize>();
-            surfaces + pngs.iter().map(Vec::len).sum::<usize>()
-        });
+impl<'b> FileBuilder<'b> {
+    /// As an empty one, with room for scenes: files of large trees are not copied while they grow.
+    pub fn for_scenes<'s>(scenes: impl Iterator<Item = &'s Scene>) -> Self {
+        let bytes = scenes.flat_map(|s| &s.surfaces).map(Surface::bytes);
         Self {
-            glb: GlbBuilder::with_capacity(bytes.sum::<usize>() + JSON),
+            glb: GlbBuilder::with_capacity(bytes.sum()),
             ..Self::default()
         }
     }
 
     /// Adds all surfaces of a scene as one mesh and returns its index; `pngs` are its images.
     /// Images and materials that an earlier mesh has brought are shared.
-    pub fn mesh(&mut self, name: &str, scene: &Scene, pngs: &[Vec<u8>]) -> Result<usize> {
+    pub fn mesh(&mut self, name: &str, scene: &Scene, pngs: &'b [Vec<u8>]) -> Result<usize> {
         let materials = self.materials(scene, pngs);
         self.mesh_of(name, &scene.surfaces, &scene.materials, &materials)
     }
@@ -93,12 +100,16 @@ impl FileBuilder {
     }
 
     /// Adds a scene's materials and images; returns the number of each material in the file.
-    pub fn materials(&mut self, scene: &Scene, pngs: &[Vec<u8>]) -> Vec<usize> {
+    pub fn materials(
+        &mut self,
+        scene: &Scene,
+        pngs: impl IntoIterator<Item = impl Into<Cow<'b, [u8]>>>,
+    ) -> Vec<usize> {
         let images: Vec<usize> = scene
             .images
             .iter()
             .zip(pngs)
-            .map(|(image, png)| self.image(&image.name, png))
+            .map(|(image, png)| self.image(&image.name, png.into()))
             .collect();
         scene
             .materials
@@ -182,12 +193,12 @@ impl FileBuilder {
         Ok(self.meshes.len() - 1)
     }
 
-    fn image(&mut self, name: &str, png: &[u8]) -> usize {
-        let digest = sha256(png);
+    fn image(&mut self, name: &str, png: Cow<'b, [u8]>) -> usize {
+        let digest = sha256(&png);
         if let Some(index) = self.digests.iter().position(|d| *d == digest) {
             return index;
         }
-        let view = self.glb.view(png, None);
+        let view = self.glb.view_of(png, None);
         let mut entry = json!({ "bufferView": view, "mimeType": "image/png" });
         if !name.is_empty() {
             entry["name"] = json!(name);
@@ -272,6 +283,14 @@ impl FileBuilder {
     /// # Errors
     /// [`Error::Usage`] where it is too large for a GLB.
     pub fn finish(self, scene_nodes: Vec<usize>) -> Result<Vec<u8>> {
+        self.finish_in_pieces(scene_nodes).map(Glb::into_bytes)
+    }
+
+    /// As [`FileBuilder::finish`], with images where they are.
+    ///
+    /// # Errors
+    /// As [`FileBuilder::finish`].
+    pub fn finish_in_pieces(self, scene_nodes: Vec<usize>) -> Result<Glb<'b>> {
         self.with_scenes(vec![json!({ "nodes": scene_nodes })])
     }
 
@@ -282,9 +301,10 @@ impl FileBuilder {
     pub fn finish_scenes(self, scenes: &[(&str, Vec<usize>)]) -> Result<Vec<u8>> {
         let scene = |(name, nodes): &(&str, Vec<usize>)| json!({ "name": name, "nodes": nodes });
         self.with_scenes(scenes.iter().map(scene).collect())
+            .map(Glb::into_bytes)
     }
 
-    fn with_scenes(mut self, scenes: Vec<Value>) -> Result<Vec<u8>> {
+    fn with_scenes(mut self, scenes: Vec<Value>) -> Result<Glb<'b>> {
         fits(self.glb.bytes() as u64)?;
         if self.unlit {
             self.use_extension("KHR_materials_unlit");
@@ -313,7 +333,7 @@ impl FileBuilder {
         if !self.required.is_empty() {
             root["extensionsRequired"] = json!(self.required);
         }
-        Ok(self.glb.finish(root))
+        Ok(self.glb.finish_in_pieces(root))
     }
 }
 
