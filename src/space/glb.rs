@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 /// file is written: those of all levels are as large as the file.
 #[derive(Default)]
 pub struct GlbBuilder<'b> {
-    /// The buffer; each begins at a multiple of four bytes.
+    /// The buffer: own pieces, and such as stay where they are.
     pieces: Vec<Cow<'b, [u8]>>,
     /// Length of all of them.
     bytes: usize,
