@@ -197,10 +197,41 @@ fn table(report: &Report) -> String {
         }
     }
     out += "\nE: error over that of the original moved by half a pixel; 1 is as near as that. Reference: 4 x 4 samples a pixel, more under 128 px.\n";
+    out += &losses(report);
     if report.levels.iter().any(|l| l.orbit.is_some()) {
         out += &looks(report);
     }
     out
+}
+
+/// What a client costs the silhouettes, and what is to blame; nothing where that was not measured.
+fn losses(report: &Report) -> String {
+    let mut out = String::new();
+    for level in &report.levels {
+        for size in &level.sizes {
+            let Some(client) = size.client.as_deref().filter(|c| !c.sampled.is_empty()) else {
+                continue;
+            };
+            let lost = |f1: &Figure| size.f1.mean - f1.mean;
+            let few = client
+                .sampled
+                .iter()
+                .map(|few| format!("{:>8.3} with {}", lost(&few.f1), few.samples));
+            let few: String = few.collect();
+            out += &format!(
+                "{:<28}{:>6}{:>8.3} in a client{few}\n",
+                level.file,
+                size.height_px,
+                lost(&client.f1)
+            );
+        }
+    }
+    match out.is_empty() {
+        true => out,
+        false => format!(
+            "\nF1 lost, means: in a client (mips, 4 samples of edges and 1 of alpha), with so few samples a pixel and no mips:\n{out}"
+        ),
+    }
 }
 
 /// Colours and what lies inside, and what changes: means over views.

@@ -23,6 +23,6 @@ pub struct Asked<'a> {
     pub looks: bool,
     /// Whether everything is also drawn as an engine does.
     pub client: bool,
-    /// Whether the base colours of that are wanted.
-    pub base_colors: bool,
+    /// Whether the causes of what is lost there are wanted: base colours, and few samples alone.
+    pub causes: bool,
 }

@@ -126,7 +126,7 @@ pub fn evaluate_watched<E: Send>(
         starts_px: &settings.starts(levels.len()),
         looks: settings.appearance,
         client: settings.client,
-        base_colors: settings.client,
+        causes: settings.client,
     };
     let found = measure(&asked, &actors(&asked), &all, seen)?;
     for (row, found) in rows.iter_mut().zip(found) {

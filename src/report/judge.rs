@@ -60,7 +60,7 @@ pub fn judge(
         starts_px: &[],
         looks: false,
         client: true,
-        base_colors: false,
+        causes: false,
     };
     let actors = actors(&asked);
     for &height_px in &all {

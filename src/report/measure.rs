@@ -7,9 +7,11 @@ use rayon::prelude::*;
 
 use super::asked::Asked;
 use super::outline::{Outline, summary};
-use super::schema::{Appearance, Change, Figure, Jump, Orbit, SizeFigures, ViewAppearance};
+use super::schema::{
+    Appearance, Change, Figure, Jump, Orbit, Sampled, SizeFigures, ViewAppearance,
+};
 use super::stage::Actor;
-use super::stand::{Leap, OfSize, OfView, STEP_DEG, Stand};
+use super::stand::{FEW_SIDES, Leap, OfSize, OfView, STEP_DEG, Stand};
 use crate::space::raster::Tone;
 
 /// What was found of one model.
@@ -53,7 +55,7 @@ pub fn measure<E: Send>(
 
 /// Everything that drawing needs of the models of a measurement.
 pub fn actors<'a>(asked: &Asked<'a>) -> Vec<Actor<'a>> {
-    let colors = asked.looks || asked.base_colors;
+    let colors = asked.looks || asked.causes;
     [asked.original]
         .iter()
         .chain(asked.levels)
@@ -101,6 +103,7 @@ fn figures(height_px: u32, moved_f1: f64, views: &[&OfSize]) -> Option<SizeFigur
     if let Some(client) = &mut client {
         let all: Tone = views.iter().filter_map(|v| v.base_color).sum();
         client.base_color_linear = all.mean();
+        client.sampled = sampled(views);
     }
     let looks: Vec<ViewAppearance> = views.iter().filter_map(|v| v.look.clone()).collect();
     Some(SizeFigures {
@@ -108,6 +111,19 @@ fn figures(height_px: u32, moved_f1: f64, views: &[&OfSize]) -> Option<SizeFigur
         appearance: (!looks.is_empty()).then(|| Box::new(Appearance::over(looks))),
         ..outlines(|v| v.outline.as_ref())?
     })
+}
+
+/// What F1 falls to with few samples, over all views.
+fn sampled(views: &[&OfSize]) -> Vec<Sampled> {
+    let of = |(number, side): (usize, &u32)| {
+        let all = views.iter().filter_map(|v| v.few_samples.as_ref());
+        let outlines: Vec<&Outline> = all.map(|few| &few[number]).collect();
+        (!outlines.is_empty()).then(|| Sampled {
+            samples: side * side,
+            f1: Figure::least(outlines.iter().map(|o| (o.view(), o.f1()))),
+        })
+    };
+    FEW_SIDES.iter().enumerate().filter_map(of).collect()
 }
 
 fn jump(height_px: u32, leaps: Vec<Leap>) -> Option<Jump> {

@@ -32,6 +32,11 @@ impl Outline {
         }
     }
 
+    /// The view's name.
+    pub fn view(&self) -> &str {
+        &self.view
+    }
+
     /// F1 of the silhouettes.
     pub fn f1(&self) -> f64 {
         self.found.f1()
@@ -81,6 +86,7 @@ pub fn summary(height_px: u32, shifted_f1: f64, outlines: &[Outline]) -> SizeFig
         half_area_ratio: Figure::ratio(over(|v| v.half_area_ratio)),
         client: None,
         base_color_linear: None,
+        sampled: Vec::new(),
         appearance: None,
         views,
     }

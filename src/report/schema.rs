@@ -101,6 +101,9 @@ pub struct SizeFigures {
     /// of an evaluation.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub base_color_linear: Option<[f64; 3]>,
+    /// What few samples cost by themselves, without mips; only in `client` of an evaluation.
+    #[serde(skip_serializing_if = "Vec::is_empty", default)]
+    pub sampled: Vec<Sampled>,
     /// Colours, distances and normals against the original's; absent where they were not measured
     /// (in the report of a bake).
     #[serde(skip_serializing_if = "Option::is_none", default)]
@@ -108,6 +111,17 @@ pub struct SizeFigures {
     /// The views, one by one.
     #[serde(skip_serializing_if = "Vec::is_empty", default)]
     pub views: Vec<ViewFigures>,
+}
+
+/// A level drawn with as few samples as an engine takes, all of them with the finest texels, against the
+/// supersampled original. An engine takes four of a triangle's edges and one of its alpha: what F1 falls to with
+/// four and with one is the share of its loss that no alpha and no mips are to blame for.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Sampled {
+    /// Samples of a pixel: 4 (2 x 2) or 1.
+    pub samples: u32,
+    /// Harmonic mean of precision and recall of the silhouettes at half coverage.
+    pub f1: Figure,
 }
 
 /// A figure over views.

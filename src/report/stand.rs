@@ -7,8 +7,11 @@ use super::schema::ViewAppearance;
 use super::shot::Shot;
 use super::silhouette::moved_f1;
 use super::stage::{Actor, Order, Window, sampling};
-use crate::space::raster::{Camera, Mask, Tone};
+use crate::space::raster::{Camera, Mask, Sampling, Tone};
 use crate::space::view::View;
+
+/// Samples along a pixel's edge where an engine has few: of edges, and of alpha.
+pub const FEW_SIDES: [u32; 2] = [2, 1];
 
 /// Angle between two frames of an orbit, degrees.
 pub const STEP_DEG: f32 = 1.0;
@@ -36,6 +39,8 @@ pub struct OfSize {
     pub client: Option<Outline>,
     /// [`Actor::base_color`].
     pub base_color: Option<Tone>,
+    /// With few samples and no mips, as many along a pixel's edge as [`FEW_SIDES`] says.
+    pub few_samples: Option<[Outline; 2]>,
     /// How it looks beside the original.
     pub look: Option<ViewAppearance>,
 }
@@ -177,6 +182,7 @@ impl<'a> Stand<'a> {
             } else {
                 None
             },
+            few_samples: None,
             look: None,
         });
     }
@@ -197,6 +203,7 @@ impl<'a> Stand<'a> {
             moved_f1: 0.0,
             client: self.client(original, actor, camera),
             base_color: self.base_color(actor, camera),
+            few_samples: self.few_samples(original, actor, camera),
             look: both.map(|(a, b)| self.compare(a, b)),
         }
     }
@@ -208,8 +215,21 @@ impl<'a> Stand<'a> {
         })
     }
 
+    fn few_samples(&self, original: &Drawn, actor: usize, camera: &Camera) -> Option<[Outline; 2]> {
+        let drawn = |side| {
+            let sampling = Sampling {
+                side,
+                ..Sampling::REFERENCE
+            };
+            let mask = self.actors[actor].mask(camera, sampling);
+            let fraction = mask.coverage().fraction;
+            Outline::new(&self.view.name, original.coverage(), &fraction)
+        };
+        self.asked.causes.then(|| FEW_SIDES.map(drawn))
+    }
+
     fn base_color(&self, actor: usize, camera: &Camera) -> Option<Tone> {
-        let asked = self.asked.base_colors;
+        let asked = self.asked.causes;
         asked.then(|| self.actors[actor].base_color(camera))
     }
 

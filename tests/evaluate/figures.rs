@@ -158,6 +158,14 @@ fn a_client_loses_area_where_mips_thin_the_leaves() {
     assert_eq!(level.f1.worst, 1.0);
     let client = level.client.as_ref().unwrap();
     assert!(client.area_ratio.mean < 0.3, "{:?}", client.area_ratio);
+    // Mips are to blame, not the number of samples: without them one loses more than four do, and neither much.
+    let [four, one] = &client.sampled[..] else {
+        panic!("{:?}", client.sampled)
+    };
+    assert_eq!((four.samples, one.samples), (4, 1));
+    let lost = [&client.f1, &four.f1, &one.f1].map(|f1| 1.0 - f1.mean);
+    assert!(lost[1] < lost[2] && lost[2] < lost[0], "{lost:?}");
+    assert!(level.sampled.is_empty(), "{:?}", level.sampled);
     assert_eq!(
         report.levels[0].texture_bytes,
         4 * (4096 + 1024 + 256 + 64 + 16 + 4 + 1)

@@ -55,6 +55,10 @@ const IDLE: usize = 2;
 /// Cards that are seen from aside show coarser mips than those that are seen face on, by so many halvings in the mean.
 const ASIDE: f32 = 0.7;
 
+/// A mip that a client reaches but for so many halvings is one that is seen: where a level starts with a texel a pixel, what is
+/// rounded must not decide.
+const NEARLY: f32 = 0.1;
+
 /// How dear squares of errors are: a hundredth of the area from near is as dear as two and a half of what a client covers.
 const DEAR_NEAR: f64 = 400.0;
 const DEAR_CLIENT: f64 = 60.0;
@@ -126,7 +130,7 @@ fn seen(halvings: &[f32], mips: usize) -> Range<usize> {
         [f32::min, f32::max].map(|of| halvings.iter().copied().reduce(of).unwrap_or(0.0));
     // The base level is none of them.
     let first = (nearest as usize).saturating_sub(1);
-    first.min(mips)..(farthest.max(0.0) as usize + 1).min(mips)
+    first.min(mips)..((farthest + NEARLY).max(0.0) as usize + 1).min(mips)
 }
 
 /// What thresholds are asked for.
@@ -218,6 +222,7 @@ mod tests {
     fn mips_are_seen_from_where_a_level_starts_to_twice_that_distance() {
         // A texel a pixel: the base level, the first and the second mip.
         assert_eq!(seen(&[0.0, 1.0], 5), 0..2);
+        assert_eq!(seen(&[-1e-6, 1.0 - 1e-6], 5), 0..2);
         assert_eq!(seen(&[-0.3, 0.7], 5), 0..1);
         // Two: the first to the third. Four and a half: the second to the fourth.
         assert_eq!(seen(&[1.1, 2.1], 5), 0..3);
