@@ -158,7 +158,7 @@ fn a_client_loses_area_where_mips_thin_the_leaves() {
     assert_eq!(level.f1.worst, 1.0);
     let client = level.client.as_ref().unwrap();
     assert!(client.area_ratio.mean < 0.3, "{:?}", client.area_ratio);
-    // Mips are to blame, not the number of samples: without them one loses more than four do, and neither much.
+    // Mips are more to blame than the number of samples: without them one loses more than four do, and less than a client.
     let [four, one] = &client.sampled[..] else {
         panic!("{:?}", client.sampled)
     };
