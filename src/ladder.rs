@@ -7,6 +7,10 @@ use crate::scene::Scene;
 /// Levels of at most so many triangles are billboards of the whole tree.
 pub const WHOLE_TREE_TRIANGLES: u64 = 24;
 
+/// The first three of [`Wanted::Levels`] have at least so many triangles, each one after them half as many, down to a
+/// whole-tree billboard: of a bush of 4,760, a hundredth leaves a third of its stems.
+const NEAR_TRIANGLES: u64 = 4 * WHOLE_TREE_TRIANGLES;
+
 /// Levels where nothing else is asked for.
 pub const DEFAULT_LEVELS: usize = 4;
 
@@ -37,8 +41,8 @@ impl Limit {
 pub enum Wanted {
     /// One for each limit.
     Limits(Vec<Limit>),
-    /// This many at doubling distances, with 10 %, 3 %, 1 %, .3 % ... of the triangles; the last
-    /// one is a billboard of the whole tree.
+    /// This many at doubling distances, with 10 %, 3 %, 1 %, .3 % ... of the triangles, of small trees with at least
+    /// 96, 96, 96, 48, 24 ... (no more than half of their own); the last one is a billboard of the whole tree.
     Levels(usize),
 }
 
@@ -159,10 +163,15 @@ fn explicit(limits: &[Limit], all: u64, least: u64) -> Result<Vec<u64>> {
 
 fn shares(count: usize, all: u64) -> Vec<u64> {
     let share = |i: usize| [0.1, 0.03][i % 2] * 0.1f64.powi((i / 2) as i32);
-    let near = (0..count.saturating_sub(1)).map(|i| Limit::Share(share(i)).triangles(all));
-    near.map(|n| n.max(WHOLE_TREE_TRIANGLES))
-        .chain([WHOLE_TREE_TRIANGLES])
-        .collect()
+    let least = |i: usize| {
+        let halvings = i.saturating_sub(2).min(2);
+        (NEAR_TRIANGLES >> halvings)
+            .min(all / 2)
+            .max(WHOLE_TREE_TRIANGLES)
+    };
+    let near =
+        (0..count.saturating_sub(1)).map(|i| Limit::Share(share(i)).triangles(all).max(least(i)));
+    near.chain([WHOLE_TREE_TRIANGLES]).collect()
 }
 
 fn listed(heights: &[f64], count: usize) -> Result<Vec<f64>> {
@@ -247,6 +256,19 @@ mod tests {
         assert_eq!(heights, [512.0, 256.0, 128.0, 64.0]);
         // The last one never ends.
         assert_eq!((rungs[0].end_px, rungs[3].end_px), (256.0, 0.0));
+    }
+
+    #[test]
+    fn levels_of_small_trees_are_not_starved() {
+        let counts = |levels, all| -> Vec<u64> {
+            let rungs = of(Wanted::Levels(levels), all);
+            rungs.iter().map(|r| r.triangles).collect()
+        };
+        assert_eq!(counts(4, 4760), [476, 142, 96, 24]);
+        assert_eq!(counts(6, 4760), [476, 142, 96, 48, 24, 24]);
+        assert_eq!(counts(6, 500), [96, 96, 96, 48, 24, 24]);
+        assert_eq!(counts(4, 100), [50, 50, 50, 24]);
+        assert_eq!(counts(1, 500), [24]);
     }
 
     #[test]

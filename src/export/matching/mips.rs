@@ -193,6 +193,37 @@ mod tests {
     }
 
     #[test]
+    fn texels_of_no_chart_help_blocks_to_pass() {
+        let size = [64, 32];
+        // Of every block of 4 x 4 texels one is opaque and two are nobody's, as between cards of a few texels.
+        let score = |i: u32| match (i % size[0] % 4, i / size[0] % 4) {
+            (1, 1) => 0.9,
+            (3, 3) | (0, 3) => f32::NEG_INFINITY,
+            _ => 0.1,
+        };
+        let scores: Vec<f32> = (0..size[0] * size[1]).map(score).collect();
+        let page = page(&scores, size);
+        let mips = means(&page, 0.5);
+        let filled = |least: f32| {
+            let mut rule = Rule::of(0.5);
+            rule.passes[1] = Some(least);
+            let mut alpha = vec![0; scores.len()];
+            fill(&mut alpha, &page, &mips.iter().collect::<Vec<_>>(), &rule);
+            for (at, (&alpha, &score)) in alpha.iter().zip(&scores).enumerate() {
+                assert_eq!(alpha >= 128, score > 0.5, "{at}");
+            }
+            let second = halved(&halved(&alpha, 64), 32);
+            (alpha, passed(&second))
+        };
+        let [leaf, open] = OPACITIES;
+        let mean = (leaf + 13.0 * open) / 14.0;
+        let (alpha, shown) = filled(mean - 0.05);
+        assert_eq!(shown, 1.0);
+        assert!(alpha[3 * 64] > 100, "{}", alpha[3 * 64]);
+        assert_eq!(filled(mean + 0.05).1, 0.0);
+    }
+
+    #[test]
     fn dense_leaves_open_up_where_they_are_thinnest() {
         let size = [64, 32];
         // Mostly opaque, with a hole in every block of 4 x 4; larger ones on the right.
