@@ -148,6 +148,12 @@ fn explicit(limits: &[Limit], all: u64, least: u64) -> Result<Vec<u64>> {
         ));
     }
     if let Some(i) = (1..counts.len()).find(|&i| counts[i] > counts[i - 1]) {
+        let help = match [limits[i - 1], limits[i]] {
+            [Limit::Share(_), Limit::Count(_)] => {
+                "of so small a tree that share is fewer: leave one of the two levels out"
+            }
+            _ => "order the numbers of --triangles from many to few",
+        };
         return Err(Error::usage(
             format!(
                 "level {} may have {} triangles, more than the nearer level's {}",
@@ -155,7 +161,7 @@ fn explicit(limits: &[Limit], all: u64, least: u64) -> Result<Vec<u64>> {
                 counts[i],
                 counts[i - 1]
             ),
-            "order the numbers of --triangles from many to few",
+            help,
         ));
     }
     Ok(counts)
@@ -295,6 +301,20 @@ mod tests {
             super::rungs(&Wanted::Levels(1), &scene, 1000, LEAST_TRIANGLES).unwrap()[0].height_px,
             100.0
         );
+    }
+
+    #[test]
+    fn limits_that_grow_are_refused_with_a_way_out() {
+        let refused = |limits: [Limit; 2]| {
+            let wanted = Wanted::Limits(limits.to_vec());
+            let found = rungs(&wanted, &Scene::default(), 930, LEAST_TRIANGLES);
+            found.unwrap_err().to_string()
+        };
+        // 9 of 930.
+        let small = refused([Limit::Share(0.01), Limit::Count(24)]);
+        assert!(small.contains("leave one of the two levels out"), "{small}");
+        let grows = refused([Limit::Count(9), Limit::Count(24)]);
+        assert!(grows.contains("from many to few"), "{grows}");
     }
 
     #[test]

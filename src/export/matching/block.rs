@@ -70,8 +70,8 @@ impl Block {
         for (y, row) in scores.chunks_exact(width).enumerate() {
             let out = &mut self.spans[y * side..][..side];
             for (span, &score) in out.iter_mut().zip(&row[left..]) {
-                // Texels of no chart are empty unless a block needs them: where cards are of a few texels, empty ones
-                // between them would let none of their mips pass.
+                // Those of no chart, too: where cards are a few texels large, empty ones between them would let hardly
+                // a block of texels pass.
                 let (low, high) = match score >= rule.threshold {
                     true => (PASSING, 255.0),
                     false => (0.0, FAILING),

@@ -233,6 +233,24 @@ mod tests {
     }
 
     #[test]
+    fn the_base_level_is_asked_for_less_where_much_is_missing_from_afar() {
+        let asked = |farthest: f64| {
+            let found = Matched {
+                threshold: 0.3,
+                ratios: vec![2.0, farthest],
+                ..Matched::default()
+            };
+            let asked = Asked::new(&found);
+            assert_eq!(asked.parts, [1.0; MIPS]);
+            assert_eq!(asked.thresholds, [0.3; MIPS]);
+            asked.near
+        };
+        assert!((asked(0.8) - 0.65 * 0.8f64.ln()).abs() < 1e-12);
+        // Too much is no reason to ask for more, and there is a least.
+        assert_eq!((asked(1.5), asked(0.1)), (0.0, -0.5));
+    }
+
+    #[test]
     fn a_mip_is_asked_for_more_where_too_little_is_seen_of_it() {
         let found = Matched {
             ratios: vec![1.0, 0.9],
