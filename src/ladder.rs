@@ -150,7 +150,7 @@ fn explicit(limits: &[Limit], all: u64, least: u64) -> Result<Vec<u64>> {
     if let Some(i) = (1..counts.len()).find(|&i| counts[i] > counts[i - 1]) {
         let help = match [limits[i - 1], limits[i]] {
             [Limit::Share(_), Limit::Count(_)] => {
-                "of so small a tree that share is fewer: leave one of the two levels out"
+                "that share of this tree is fewer: ask for a larger one, or leave one of the two levels out"
             }
             _ => "order the numbers of --triangles from many to few",
         };

@@ -41,7 +41,7 @@ impl Rule {
     /// A texel's alpha where no mip asks for another.
     #[inline]
     pub fn alpha(&self, score: f32) -> u8 {
-        // Texels of no chart score minus infinity and stay empty: their neighbours' mips are theirs.
+        // Texels of no chart score minus infinity: they are empty.
         let above = score - self.threshold;
         let alpha = alpha(above).round() as u8;
         match above >= 0.0 {
